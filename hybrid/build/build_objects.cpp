@@ -21,8 +21,8 @@ namespace hybrid {
 namespace {
 
 constexpr int kBallSubdivisions = 4;  // 5,120 triangles for drawing and the map; contact is exact
-// Bytes a voxel once touched, measured with 160³ voxels: 61 with one label, 96 with four labels in layers,
-// 179 with labels mixed voxel by voxel, 228 with plasticity; 24 more with bricks.
+// Bytes per voxel after it was touched, measured with 160³ voxels: 61 with one label, 96 with four labels in
+// layers, 179 with labels mixed voxel by voxel, 228 with plasticity; 24 more with bricks.
 constexpr double kTouchedBytes = 60.0, kTouchedMixedBytes = 180.0, kYieldBytes = 50.0, kBrickBytes = 25.0;
 
 std::string in_words(const polygon::Finding& f) {
@@ -77,7 +77,7 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-// Repairs by the file's reader are reported to the user.
+// Reads a volume. Repairs that its reader made are added to `notes`.
 voxel::LabelVolume read_volume(const std::string& object, const std::filesystem::path& file,
                                const voxel::VolumeFileOptions& options, std::vector<BuildNote>& notes) {
   std::vector<std::string> of_file;
@@ -105,7 +105,7 @@ RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurface
       throw std::runtime_error(
           "the cuts leave nothing of this surface; a cut removes the side its normal points to");
   }
-  // A cut surface is open by intent, so this is not reported.
+  // A cut surface is open on purpose, so its open edges are not reported.
   if (s.cuts.empty()) return mesh_object(d, frame, std::move(mesh), notes);
   return surface_object(d, frame, std::move(mesh), false);
 }

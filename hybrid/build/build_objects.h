@@ -9,7 +9,7 @@ namespace hybrid {
 // Reads or makes the surface. Adds findings to `notes`. Throws std::exception with a message.
 RigidObject build_rigid(const RigidDescription& description, std::vector<BuildNote>& notes);
 
-// Motion of an object that is built. Throws std::exception with a message.
+// Makes the motion of an object that was built. Throws std::exception with a message.
 RigidMotion build_motion(const RigidDescription& description, const RigidObject& object);
 
 // Bound on the distance between the exact surface of a primitive and its triangles in the occupancy map (m).
@@ -19,7 +19,7 @@ double map_margin_m(const RigidDescription& description);
 // std::exception with a message.
 voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes);
 
-// The part of a mesh that no plane cuts away, clipped exactly; `to_scene` is the mesh's pose.
+// Returns the part of a mesh that no plane cuts away, clipped exactly. `to_scene`: the mesh's pose.
 polygon::TriangleMesh cut_mesh(const polygon::TriangleMesh& mesh, const Pose& to_scene,
                                const std::vector<CutPlane>& cuts);
 

@@ -24,10 +24,10 @@
 namespace hybrid {
 namespace {
 
-constexpr int kSurfaceSmoothing = 6;  // of a soft object's drawn surface
-// Default bound of cells along the scene's longest side: 64 bricks at any alignment.
+constexpr int kSurfaceSmoothing = 6;  // smoothing passes of a soft object's drawn surface
+// Most cells along the scene's longest side by default. They lie in at most 64 bricks at any alignment.
 constexpr double kMostCells = 504.0;
-constexpr double kRigidCells = 200.0;      // if nothing is soft: finer cells exclude no further objects
+constexpr double kRigidCells = 200.0;      // the same if nothing is soft; finer cells exclude no more objects
 constexpr std::size_t kMapReserve = 2048;  // spare bricks for motion
 
 struct Box {
@@ -61,8 +61,8 @@ double choose_cell(const Scene& scene, const Box& box, double soft_spacing) {
   const glm::dvec3 size = box.high - box.low;
   const double longest = std::max({size.x, size.y, size.z});
   if (scene.occupancy_cell_m) {
-    // Surfaces occupy about one sheet of cells on each side of the scene, with a brick of 2.6 kB each in the
-    // worst case.
+    // Estimate: surfaces occupy about one sheet of cells on each of the scene's six sides. In the worst case,
+    // every 8 × 8 cells of a sheet need a brick of their own, which takes 2.6 kB.
     const double across = longest / *scene.occupancy_cell_m;
     const double bytes = 6.0 * across * across / 64.0 * 2600.0;
     if (bytes > 0.25 * static_cast<double>(usable_memory_bytes())) {
@@ -140,7 +140,7 @@ class Builder {
     return boxes;
   }
 
-  // The objects of `boxes` that are nearer to object `own` than a share of its size, in turn.
+  // Visits the objects whose boxes are nearer to the box of object `own` than kClearance times its size.
   template <class Visit>
   void for_near(const std::vector<Box>& boxes, std::size_t own, const Visit& visit) const {
     constexpr double kClearance = 0.25;
@@ -153,8 +153,8 @@ class Builder {
     }
   }
 
-  // Why soft object `o` may meet something that moves or gives way, in words; empty if it cannot: no rigid
-  // object moves, and no other soft one is near.
+  // Says in words why soft object `o` may meet something that moves or gives way. Empty if it cannot: no
+  // rigid object moves, and no other soft object is near.
   std::string may_meet(const std::vector<Box>& boxes, std::size_t o) const {
     const auto moves = std::find_if(world_->rigid.begin(), world_->rigid.end(),
                                     [](const RigidObject& object) { return object.motion.moves(); });
@@ -168,8 +168,9 @@ class Builder {
     return why;
   }
 
-  // Gives contacts on nested patches to objects that can meet nothing but the tool and rigid objects that
-  // stand still. Obstacles for these, and for all objects that are kept voxel by voxel.
+  // Objects that can meet nothing but the tool and standing rigid objects get contacts on nested patches.
+  // Obstacles are found for objects that have rigid objects near, and for all objects that are kept voxel by
+  // voxel.
   void use_patches_and_obstacles() {
     const std::vector<Box> boxes = boxes_at_rest();
     for (std::size_t o = 0; o < world_->soft.size(); ++o) {
@@ -292,7 +293,7 @@ class Builder {
     }
   }
 
-  // No error: the scene fits as long as only a part of it is touched.
+  // Notes a warning, not an error: the scene fits as long as only a part of it is touched.
   void note_memory(const SoftDescription& d, const voxel::Lattice& lattice) {
     const std::uint64_t bytes = soft_touched_bytes(lattice), usable = usable_memory_bytes();
     if (bytes <= usable) return;
@@ -367,7 +368,7 @@ class Builder {
     }
     world_->encoder_m = scene_limits(scene_).resolution_m;
     world_->limits.deadline_s = scene_.deadline_periods / scene_.rate_hz;
-    // A device that follows its path whatever the force absorbs no energy.
+    // An ideal device follows its path whatever the force is, so it absorbs no energy.
     const bool ideal = is_ideal(scene_);
     if (ideal && !scene_.max_energy_given)
       world_->limits.max_energy_J = std::numeric_limits<double>::infinity();

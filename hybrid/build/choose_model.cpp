@@ -12,10 +12,10 @@
 namespace hybrid {
 namespace {
 
-// Stiffness from which on a hand takes a surface for rigid: 153 to 415 N/cm in Tan, Srinivasan, Eberman &
-// Cheng, "Human factors for the design of force-reflecting haptic interfaces" (1994).
+// A hand takes a surface for rigid from about this stiffness on: 153 to 415 N/cm in Tan, Srinivasan, Eberman
+// & Cheng, "Human factors for the design of force-reflecting haptic interfaces" (1994).
 constexpr double kRigidToAHand_N_per_m = 25e3;
-// For a device without a limit, that of the largest device known here.
+// Force limit assumed for a device without one: that of the largest device known here.
 constexpr double kStrongForce_N = 37.5;
 
 struct Stiffness {
@@ -41,8 +41,9 @@ struct Choice {
   std::string reason;
 };
 
-// The hand feels tissue and coupling in series, limited by what the device renders and a hand can tell. If
-// that is within a just noticeable difference of a rigid surface, voxels are not needed.
+// The felt stiffness is that of tissue and coupling in series. It is limited by the stiffness that the device
+// can render, and by the stiffness from which on a hand takes a surface for rigid. If it is within a just
+// noticeable difference of the felt stiffness of a rigid surface, voxels are not needed.
 Choice choose(const Scene& scene, const SoftDescription& soft) {
   if (scene.tool.shape == Tool::Shape::punch) return {false, "a punch is felt by voxels alone"};
   const device::DeviceLimits limits = scene_limits(scene);

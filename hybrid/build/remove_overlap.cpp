@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kQueryAhead = 32.0;  // spacings beyond the decision range that one distance query can settle
+constexpr double kQueryAhead = 32.0;  // spacings by which a distance query looks beyond the decision range
 
 // Distance to the nearest rigid surface within `range`, to the nearest fixed one, and whether the point is
 // inside a rigid solid.

@@ -11,7 +11,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kAlike = 1.0 + 1e-6;  // a felt radius that is no larger than the tool's
+constexpr double kAlike = 1.0 + 1e-6;  // a felt radius up to this is not reported (unit: the tool's radius)
 
 double largest(const glm::dvec3& h) {
   return std::max({h.x, h.y, h.z});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Notes on a soft object: how its spacing and the tool change the felt surface, and keys that its volume
-// leaves without effect.
+// Notes on a soft object: how its spacing and the tool change the felt surface, and which of its keys have no
+// effect with its volume.
 #pragma once
 
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace hybrid {
 
-// Slices thicker than this, by their pixels, move the felt surface by an eighth of a pixel or more.
+// Slices thicker than this (unit: pixel size) move the felt surface by an eighth of a pixel or more.
 inline constexpr double kThickSlices = 1.25;
 
 // How voxels of this spacing are felt. A voxel is a ball of half the smallest spacing, and a ball that could
@@ -18,17 +18,18 @@ inline constexpr double kThickSlices = 1.25;
 struct FeltLattice {
   // Across the thickest axis the tool meets the surface this far inside of its volume; negative: outside.
   double inside_m = 0.0;
-  double dip_m = 0.0;          // between two voxels along that axis the tool sinks this far further
-  double felt_radius_m = 0.0;  // of the tool
+  double dip_m = 0.0;          // how much deeper the tool sinks between two voxels along that axis
+  double felt_radius_m = 0.0;  // radius of the tool as it is felt
 };
 [[nodiscard]] FeltLattice felt_lattice(const glm::dvec3& spacing_m, double tool_radius_m, double reach_m);
 
-// Notes on spacing and tool, in figures.
+// Adds notes on how spacing and tool change the felt surface, with figures.
 void note_felt_surface(const Tool& tool, const std::string& name, const voxel::SoftObject& object,
                        std::vector<BuildNote>& notes);
 
-// Labels that the description names and the volume does not have, and a distance to rigid objects within
-// which no voxel lies (`near_rigid`: those within it). `volume`: as it is read, before overlap is removed.
+// note_missing_labels() reports labels that the description names and the volume does not have. `volume`: as
+// read, before overlap is removed. note_missing_anchors() reports a distance `rigid_within` within which no
+// voxel lies. `near_rigid`: the voxels within it.
 void note_missing_labels(const SoftDescription& description, const voxel::LabelVolume& volume,
                          std::vector<BuildNote>& notes);
 void note_missing_anchors(const SoftDescription& description, std::span<const std::size_t> near_rigid,

@@ -52,7 +52,7 @@ void thin_object(const Scene& scene, const SoftDescription& description, voxel::
   for (std::size_t label = 1; label < 256; ++label) {
     const std::uint8_t strut = thinned.strut_label[label];
     if (strut == 0) continue;
-    options.materials[label].bricks = false;  // struts are longer links
+    options.materials[label].bricks = false;  // struts are longer links, never bricks
     options.materials[strut] = options.materials[label];
     options.materials[strut].young_Pa *= static_cast<double>(thinning.every) * thinning.every;
     auto& anchors = options.anchor_labels;

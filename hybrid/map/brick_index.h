@@ -2,9 +2,9 @@
 // A sparse set of bricks of 8×8×8 cells, the basis of every layer of the occupancy map.
 //
 // A hash table maps a brick's coordinates to a layer's entry (cell_table.h). In front of the table is a
-// bitmap of 64×64×64 units over all existing bricks; a unit is one brick or a power of two of them along each
-// edge. The bitmap has 32 kB, so that it stays in the first-level cache. A query of an empty region ends
-// after one to four words.
+// bitmap of 64×64×64 units over all existing bricks; a unit is one brick, or a power of two bricks along each
+// edge. The bitmap takes 32 kB, so it stays in the first-level cache. A query of an empty region ends after
+// one to four words.
 #pragma once
 
 #include <algorithm>
@@ -37,11 +37,11 @@ class BrickGrid {
   [[nodiscard]] double cell_m() const noexcept { return cell_m_; }
   [[nodiscard]] const glm::dvec3& origin() const noexcept { return origin_; }
 
-  // Rounds insertions and queries alike. Positions beyond the farthest cell, and NaN, are in the outermost
-  // cells, where queries from out there find them.
+  // Insertions and queries use the same rounding. Positions beyond the farthest cell, and NaN, are in the
+  // outermost cells, where queries at such positions find them.
   [[nodiscard]] CellCoordinates cell_of(const glm::dvec3& p) const noexcept {
 #if defined(__x86_64__)
-    // The same with x and y at once: rounding is a large part of a look-up along a path.
+    // Computes x and y at once, because rounding is a large part of a look-up along a path.
     const __m128d per_cell = _mm_set1_pd(per_cell_);
     const __m128i xy = floor_cells(
                       _mm_mul_pd(_mm_sub_pd(_mm_loadu_pd(&p.x), _mm_loadu_pd(&origin_.x)), per_cell)),
@@ -61,7 +61,7 @@ class BrickGrid {
     return {cell[0] >> kShift, cell[1] >> kShift, cell[2] >> kShift};
   }
 
-  // Bit x + 8 y: of one z-layer of a brick, the cells of the range `part`, which must lie in the brick.
+  // Mask of the cells of range `part` in one z-layer of a brick (bit x + 8 y). `part` must lie in the brick.
   [[nodiscard]] static std::uint64_t layer_mask(const CellRange& part) noexcept {
     constexpr std::int32_t in_brick = kEdge - 1;
     const std::int32_t x0 = part.low[0] & in_brick, x1 = part.high[0] & in_brick, y0 = part.low[1] & in_brick,
@@ -81,7 +81,7 @@ class BrickGrid {
     return part;
   }
 
-  // False: no brick that these cells touch exists. True: one may exist.
+  // False: none of the bricks that these cells touch exists. True: one may exist.
   [[nodiscard]] bool may_exist(const CellRange& cells) const noexcept {
     if (bitmap_.empty()) return true;
     const std::int32_t x0 = unit_of(cells.low, 0), x1 = unit_of(cells.high, 0), y0 = unit_of(cells.low, 1),
@@ -103,14 +103,14 @@ class BrickGrid {
   }
 
  protected:
-  // Makes an empty bitmap over bricks within these bounds; call mark() for each afterwards.
+  // Makes an empty bitmap over bricks within these bounds; call set_bit() for each brick afterwards.
   void reset_bitmap(const CellCoordinates& low, const CellCoordinates& high);
   void set_bit(const CellCoordinates& brick) noexcept;
   // Call after a brick was removed. `exists(brick)`: is it still in the table?
   template <class Exists>
   void clear_bit(const CellCoordinates& brick, Exists&& exists) noexcept {
-    // A superfluous bit costs one probe of the table. It stays where clearing needs many probes: in units of
-    // many bricks, and in the outermost units, which also stand for everything further out.
+    // A superfluous bit costs one probe of the table. It stays set where clearing would need many probes: in
+    // units of many bricks, and in the outermost units, which also stand for everything further out.
     constexpr int kMostShift = 2;
     const int shift = unit_shift_ - kShift;
     if (bitmap_.empty() || shift > kMostShift) return;
@@ -137,10 +137,10 @@ class BrickGrid {
 
  private:
   static constexpr double kFarthestCell = 1e9;
-  static constexpr std::int32_t kUnits = 64;  // of the bitmap, along an edge
+  static constexpr std::int32_t kUnits = 64;  // units of the bitmap along an edge
 
-  // The floor as an integer, without a call of std::floor, which older instruction sets need. NaN becomes the
-  // highest cell.
+  // Rounds down to an integer without std::floor, which is a function call on older instruction sets. NaN
+  // becomes the highest cell.
 #if defined(__x86_64__)
   [[nodiscard]] static __m128i floor_cells(__m128d scaled) noexcept {  // of two values
     const __m128d x = _mm_max_pd(_mm_min_pd(scaled, _mm_set1_pd(kFarthestCell)), _mm_set1_pd(-kFarthestCell));
@@ -189,8 +189,8 @@ class BrickIndex : public BrickGrid {
   [[nodiscard]] bool has_room() const noexcept { return table_.has_room(); }
   [[nodiscard]] const CellTable<Brick>& table() const noexcept { return table_; }
 
-  // kNone only if there is no room and allocation is not allowed. moved(brick, its new index) is called for
-  // all bricks if the table grew.
+  // Returns kNone only if there is no room and allocation is not allowed. If the table grew, moved(brick, its
+  // new index) is called for all bricks.
   template <class Moved>
   std::uint32_t find_or_add(const CellCoordinates& brick, bool may_allocate, Moved&& moved) {
     const std::size_t before = table_.size();
@@ -205,8 +205,8 @@ class BrickIndex : public BrickGrid {
     clear_bit(at, [this](const CellCoordinates& c) { return find(c) != kNone; });
   }
 
-  // Makes room for `more` bricks without allocation, and the bitmap over the existing ones. Bricks added
-  // later beyond the bitmap share its outermost units.
+  // Makes room for `more` bricks, which then need no allocation, and makes the bitmap over the existing
+  // bricks. Bricks added later beyond the bitmap share its outermost units.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     table_.seal(more, moved);
@@ -224,9 +224,9 @@ class BrickIndex : public BrickGrid {
     table_.each([this](const Brick& b, std::uint32_t) { set_bit(b.at); });
   }
 
-  // Calls visit(brick, cells of the range in it) for each existing brick that the range touches, until it
-  // returns false: along x first, then y, then z. A range of more bricks than the table has places goes
-  // through the places in their order.
+  // Calls visit(brick, cells of the range in it) for each existing brick that the range touches, until visit
+  // returns false. The order is along x first, then y, then z. If the range has more bricks than the table
+  // has places, the order is that of the places.
   template <class Visit>
   void each(const CellRange& cells, CellTrail& trail, Visit&& visit) const noexcept {
     if (table_.size() == 0) return;

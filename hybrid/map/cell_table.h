@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A hash table from the coordinates of a brick (or block) of cells to a layer's entry. A look-up in a large
-// table waits for memory once: entries are in the table itself, and one byte per place, few enough for a
-// cache, tells which place to read.
+// table waits for memory once: entries are in the table itself. A byte per place tells which place to read,
+// and these bytes fit into a cache.
 //
-// Places are in chunks of seven. A chunk's word has a tag for each place (0: free) and the number of entries
-// that found the chunk full and went on to the next. A search for a missing entry therefore ends without
-// reading an entry (Bronson & Shi 2019, F14). Adding or erasing moves no other entry: indices of places are
-// valid until the table grows, which happens on load only.
+// Places are in chunks of seven. A chunk's word has a tag for each place (0: free), and the number of entries
+// that found the chunk full and passed on to a later chunk. A search for a missing entry therefore ends
+// without reading an entry (Bronson & Shi 2019, F14). Adding or erasing moves no other entry: indices of
+// places are valid until the table grows, which happens on load only.
 #pragma once
 
 #include <algorithm>
@@ -33,14 +33,14 @@ using CellCoordinates = std::array<std::int32_t, 3>;
 // First coordinate of a free place; no cell has it.
 inline constexpr std::int32_t kNoPlace = std::numeric_limits<std::int32_t>::min();
 
-// A caller's cache between queries, so that a path needs no hashing: the places of the last entry and of its
-// neighbours, one for each parity of the three coordinates (a box of two along each axis has all its eight),
-// and the direction of the path. Hints only: results are the same with any trail and any table. One per
-// thread.
+// A caller's cache between queries, so that queries along a path need no hashing. It contains the place of
+// the last entry, the direction of the path, and places of neighbouring entries: one for each parity of the
+// three coordinates, so that a box of 2×2×2 has all its eight. The contents are hints only: results are the
+// same with any trail and any table. Each thread needs its own.
 struct CellTrail {
   std::uint32_t here = 0;  // place of the last entry found
   std::array<std::uint32_t, 8> place{};
-  CellCoordinates last{};  // coordinates of the last query for another entry
+  CellCoordinates last{};  // coordinates of the last query that `here` did not answer
   std::array<std::int32_t, 3> step{1, 1, 1};
 };
 
@@ -101,26 +101,26 @@ class CellTable {
     if (ahead) prefetch_ahead(at, trail);
     return place;
   }
-  // Larger than the cache of one core, so that prefetching pays.
+  // Is the table larger than the cache of one core, so that prefetching helps?
   [[nodiscard]] bool large() const noexcept {
     return entries_.size() * sizeof(Entry) > (std::size_t{1} << 19);
   }
 
-  // Prefetches for a find() that follows; several prefetches wait together. (always_inline: GCC 12 takes a
-  // function that only prefetches for one without effect, and drops its calls.)
+  // Prefetches for a find() that follows. Several prefetches wait for memory together. (always_inline: GCC 12
+  // takes a function that only prefetches for one without effect, and drops its calls.)
   [[gnu::always_inline]] void prefetch(const CellCoordinates& at) const noexcept { (void)prefetch(hash(at)); }
-  // The probable place by its tag alone; kNone: probably missing.
+  // Returns the probable place, judged by its tag alone; kNone: the entry is probably missing.
   [[gnu::always_inline]] std::uint32_t prefetch(std::uint64_t h) const noexcept {
     const std::uint64_t m = matches(chunks_[home(h)], h);
-    // Some address without a match too: a branch would wait for the tags.
+    // Without a match some address is prefetched too, because a branch would wait for the tags.
     const std::uint32_t place = place_of(home(h), m | static_cast<std::uint64_t>(m == 0) << 7);
     __builtin_prefetch(&entries_[place]);
     prefetch_rest(place);
     return m == 0 ? kNone : place;
   }
 
-  // Index of the entry's place; a missing entry is added and started. kNone only if there is no room and
-  // allocation is not allowed. If the table grew, moved(entry, its new place) was called for all.
+  // Index of the entry's place; a missing entry is added and started. Returns kNone only if there is no room
+  // and allocation is not allowed. If the table grew, moved(entry, its new place) was called for all.
   template <class Moved>
   std::uint32_t find_or_add(const CellCoordinates& at, bool may_allocate, Moved&& moved) {
     const std::uint64_t h = hash(at);
@@ -152,7 +152,7 @@ class CellTable {
     const std::size_t chunks = chunks_for(size_ + more);
     if (chunks > chunks_.size()) grow(chunks, moved);
   }
-  // Makes room for exactly `more` entries, in hardly more memory.
+  // Makes room for exactly `more` further entries, and gives back most of the spare memory.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     const std::size_t most = size_ + more;
@@ -203,7 +203,7 @@ class CellTable {
   static constexpr std::size_t kPlaces = 7;  // places of a chunk
   static constexpr int kPassedShift = 56;
   static constexpr std::uint64_t kOnePassed = 1ULL << kPassedShift,
-                                 kMostPassed = 0xFF;  // saturates
+                                 kMostPassed = 0xFF;  // the count saturates here
   static constexpr std::uint64_t kOnes = 0x0101010101010101ULL;
   static constexpr std::size_t kSpare = 8;  // a saving of less than 1/kSpare is not worth moving all entries
   static constexpr std::size_t kMostPlaces = std::size_t{1} << 26;
@@ -228,7 +228,7 @@ class CellTable {
     const std::uint64_t low = h & 0xFF;
     return low + (low == 0 ? 1 : 0);
   }
-  // Bit 8 n + 7 for each place n with this tag; bits above the first may be false.
+  // Bit 8 n + 7 is set for each place n with this tag. Bits above the lowest set bit may be wrong.
   [[nodiscard]] static std::uint64_t matches(std::uint64_t word, std::uint64_t h) noexcept {
     const std::uint64_t x = word ^ kOnes * tag(h);
     return (x - kOnes) & ~x & 0x0080808080808080ULL;
@@ -277,7 +277,7 @@ class CellTable {
       const std::uint32_t place = prefetch(finalised(parts[d][1] ^ beside));
       std::uint32_t& hint = trail.place[here ^ (1U << d)];
       hint = place != kNone ? place : hint;
-      // Prefetches the tags of the places beyond: fetching an entry must read them.
+      // Prefetches the tags of the places beyond, which must be read before an entry there can be fetched.
       __builtin_prefetch(&chunks_[home(finalised(parts[d][2] ^ beside))]);
       __builtin_prefetch(&chunks_[home(finalised(parts[d][1] ^ parts[e][1] ^ parts[f][0]))]);
     }
@@ -287,7 +287,7 @@ class CellTable {
     std::size_t chunk = home(h);
     for (;;) {  // a free place exists: most_ is less than the number of places
       std::uint64_t& word = chunks_[chunk];
-      // The lowest set bit is exact.
+      // Only the lowest set bit of `free` is used, and it is exact.
       const std::uint64_t free = (word - kOnes) & ~word & 0x0080808080808080ULL;
       if (free != 0) {
         word |= tag(h) << (std::countr_zero(free) - 7);
@@ -329,7 +329,7 @@ class CellTable {
     }
   }
 
-  std::vector<std::uint64_t> chunks_;  // bytes 0 to 6: tags; 7: entries that passed
+  std::vector<std::uint64_t> chunks_;  // bytes 0 to 6: tags; byte 7: number of entries that passed
   std::vector<Entry, HugePages<Entry>> entries_;
   std::size_t size_ = 0, most_ = 0;
 };

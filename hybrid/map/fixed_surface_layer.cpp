@@ -11,11 +11,12 @@ namespace hybrid {
 namespace {
 
 constexpr int kEdge = BrickGrid::kEdge;
-// Longer triangles are halved until each spans few cells, because the box of an oblique one is mostly empty.
+// Longer triangles are halved until each spans few cells, because the box of an oblique triangle is mostly
+// empty.
 constexpr double kLongestPiece = 8.0;  // cells
 
-// Does the triangle touch the box? Separating axes (Akenine-Möller 2001): three box axes, the plane, nine
-// edge products.
+// Does the triangle touch the box? Separating axes (Akenine-Möller 2001): three box axes, the triangle's
+// normal, and nine cross products of edges.
 bool triangle_touches_box(const std::array<glm::dvec3, 3>& t, const glm::dvec3& centre, double half) {
   const std::array<glm::dvec3, 3> v{t[0] - centre, t[1] - centre, t[2] - centre};
   const auto separates = [&v, half](const glm::dvec3& axis) {
@@ -75,7 +76,8 @@ void SurfaceCells::add_triangle(std::uint64_t object_bit, const glm::dvec3& a, c
 void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dvec3, 3>& t, double margin_m) {
   const auto [a, b] = index_.cells_of(glm::min(t[0], glm::min(t[1], t[2])) - margin_m,
                                       glm::max(t[0], glm::max(t[1], t[2])) + margin_m);
-  // In one cell, or in the cells of one row: the triangle is connected, so it touches all of them.
+  // A triangle whose box spans one cell or a row of cells touches all of them, because it is connected.
+  // Others need the exact test.
   int axes = 0;
   double farthest = 1.0;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -83,8 +85,8 @@ void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dve
     farthest = std::max({farthest, std::fabs(a[d]), std::fabs(b[d])});
   }
   const bool ask = axes > 1;
-  // Relative to the map's origin, as cells are. The box is slightly larger than the cell, so that a triangle
-  // in the face between two cells is in both despite rounding.
+  // Vertices relative to the map's origin, as cells are. The box is slightly larger than the cell, so that a
+  // triangle in the face between two cells is in both despite rounding.
   const std::array<glm::dvec3, 3> local{t[0] - index_.origin(), t[1] - index_.origin(),
                                         t[2] - index_.origin()};
   const glm::dvec3 far = glm::abs(t[0]);

@@ -24,7 +24,7 @@ class SurfaceCells {
 
   // Is there surface in a brick that the box touches?
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
-  // Bits of the objects with surface in a brick of which the box touches an occupied cell.
+  // Bits of the objects that have surface in a brick where the box touches an occupied cell.
   [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high,
                                          CellTrail& trail) const noexcept;
   [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
@@ -61,7 +61,7 @@ class SurfaceCells {
                                                std::uint64_t object_bit) const noexcept;
 
   BrickIndex<Brick> index_;
-  std::uint32_t last_ = kNone;  // brick of the last insertion, mostly the next one's too
+  std::uint32_t last_ = kNone;  // brick of the last insertion; mostly also that of the next
   glm::dvec3 low_{1e300}, high_{-1e300};
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An allocator for large arrays with random access, on pages of 2 MB if the system has them. With pages of 4
-// kB nearly every access also misses the TLB, and in a virtual machine the walk passes two page tables.
+// kB nearly every access also misses the TLB. In a virtual machine the page walk then goes through two page
+// tables.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +19,7 @@ struct HugePages {
   using value_type = T;
   HugePages() = default;
   template <class Other>
-  HugePages(const HugePages<Other>&) noexcept {}  // NOLINT(google-explicit-constructor): an allocator's
+  HugePages(const HugePages<Other>&) noexcept {}  // NOLINT(google-explicit-constructor): as allocators need
 
   [[nodiscard]] T* allocate(std::size_t count) {
     const std::size_t bytes = count * sizeof(T);

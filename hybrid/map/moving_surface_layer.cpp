@@ -19,7 +19,7 @@ double largest(const glm::dvec3& v) noexcept {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
 }
 
-// Half sizes, along the axes of another frame, of the box of a box with half sizes `half`.
+// Half sizes of the axis-aligned bounding box of a box that has half sizes `half` and is rotated by `m`.
 glm::dvec3 reach(const glm::dmat3& m, const glm::dvec3& half) noexcept {
   return glm::abs(m[0]) * half.x + glm::abs(m[1]) * half.y + glm::abs(m[2]) * half.z;
 }
@@ -35,7 +35,7 @@ void MovingSurfaceLayer::add(std::uint32_t object, std::uint64_t object_bit,
   body.cells = cells.get();
   body.object = object;
   body.middle_in_body = 0.5 * (cells->low() + cells->high());
-  // A lower bound of one cell, so that districts are no smaller than that.
+  // The added cell keeps districts from being smaller than a cell.
   body.radius_m = 0.5 * glm::length(cells->high() - cells->low()) + cells->cell_m();
   body.owner = std::move(cells);
   set_pose(body, position, rotation);
@@ -52,8 +52,8 @@ void MovingSurfaceLayer::set_pose(Body& body, const glm::dvec3& position,
   body.to_body = glm::transpose(to_scene);
   body.position = position;
   const glm::dvec3 middle = position + to_scene * body.middle_in_body;
-  // Rounding of the position, of the transformation, and of a rotation that is a unit only up to its last
-  // bits.
+  // Bound of the rounding errors of the position, of the transformation, and of a rotation that is a unit
+  // quaternion only up to its last bits.
   body.slack_m =
       1e-9 * body.cells->cell_m() + 1e-15 * (largest(position) + largest(middle)) + 1e-14 * body.radius_m;
   const glm::dvec3 half =
@@ -73,7 +73,7 @@ CellCoordinates MovingSurfaceLayer::district_of(const glm::dvec3& p) const noexc
 }
 
 CellRange MovingSurfaceLayer::districts_of(const Body& body) const noexcept {
-  // By the body's bounding ball instead of its box, so that turning in place changes no district.
+  // Uses the body's bounding ball instead of its box, so that turning in place changes no district.
   const glm::dvec3 middle = 0.5 * (body.low + body.high), ball(body.radius_m * (1.0 - 1e-12));
   return {district_of(middle - ball), district_of(middle + ball)};
 }
@@ -113,8 +113,8 @@ void MovingSurfaceLayer::relist(std::uint32_t body) noexcept {
   const CellRange now = districts_of(bodies_[body]);
   bodies_[body].districts = now;
   for (std::uint32_t slot = 0; slot < kSlots; ++slot) {
-    // Of two neighbours along an axis one is even: the district of the range that belongs in this slot, if
-    // any.
+    // A slot stands for a parity of each coordinate. Of two neighbouring districts along an axis one is even,
+    // so at most one district of the range belongs in this slot.
     CellCoordinates district = now.low;
     bool wanted = true;
     for (std::size_t d = 0; d < 3; ++d) {

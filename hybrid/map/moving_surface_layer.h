@@ -2,10 +2,10 @@
 // The moving rigid surfaces of the occupancy map.
 //
 // A body's surface cells are rasterised once, in its own frame, and move with it. They are never stale, at
-// any speed, and never rewritten. The scene keeps only the positions of bodies. Districts (cells as large as
-// the largest body, so that each body lies in at most eight) list the bodies whose bounds touch them; a move
-// changes only the districts that the body leaves or enters. A query looks up its district, compares bounds,
-// and transforms its box into the frames of those few bodies.
+// any speed, and never rewritten. The scene keeps only the positions of bodies. Districts are cells as large
+// as the largest body, so that each body lies in at most eight of them. A district lists the bodies whose
+// bounds touch it. A move changes only the districts that the body leaves or enters. A query looks up its
+// districts, compares bounds, and transforms its box into the frames of the few bodies that remain.
 #pragma once
 
 #include <array>
@@ -58,7 +58,7 @@ class MovingSurfaceLayer {
     double slack_m = 0.0;     // rounding error of positions in the body's frame
     // Read when the body moves:
     std::uint32_t object = 0;
-    double radius_m = 0.0;  // of the bounding ball about its middle
+    double radius_m = 0.0;  // radius of the bounding ball about the body's middle
     glm::dvec3 middle_in_body{0.0};
     CellRange districts;
     std::shared_ptr<const SurfaceCells> owner;
@@ -82,7 +82,7 @@ class MovingSurfaceLayer {
   // Transforms the box into the body's frame; false if it does not touch the body's bounds.
   [[nodiscard]] static bool box_in_body(const Body& body, const glm::dvec3& low, const glm::dvec3& high,
                                         glm::dvec3& low_in_body, glm::dvec3& high_in_body) noexcept;
-  // Calls visit(body) for each body that may touch the box, possibly twice, until it returns false.
+  // Calls visit(body) for each body that may touch the box, possibly twice, until visit returns false.
   template <class Visit>
   void each(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const noexcept;
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The shared occupancy map: which surface voxels and which rigid surfaces lie in which cell of the scene.
 //
-// Sparse: bricks of 8×8×8 cells in hash tables, so that memory follows occupied cells and not the scene's
-// extent. Three layers have one interface. Fixed rigid surfaces are rasterised conservatively on load, a bit
-// a cell; the exact query goes to the surface itself. Moving rigid bodies have such cells in their own
-// frames, which are never stale. Soft surface voxels are kept one by one (an intrusive list per cell) and
-// moved in O(1).
+// The map is sparse. Bricks of 8×8×8 cells are in hash tables, so memory grows with the occupied cells and
+// not with the scene's extent. Three layers have one interface. Fixed rigid surfaces are rasterised
+// conservatively on load, with a bit per cell; exact queries go to the surfaces themselves. Moving rigid
+// bodies have such cells in their own frames, so the cells are never stale. Soft surface voxels are kept one
+// by one (an intrusive list per cell) and moved in O(1).
 #pragma once
 
 #include <cstdint>
@@ -24,8 +24,8 @@ class OccupancyMap {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-  // A caller's cache for a path of queries: each starts where the last one ended. Hints only: results are the
-  // same with any trail and after any motion. One per thread.
+  // A caller's cache for queries along a path: each query starts where the last one ended. The contents are
+  // hints only: results are the same with any trail and after any motion. Each thread needs its own.
   struct Trail {
     CellTrail fixed;
     VoxelLayer::Trail soft;
@@ -46,9 +46,9 @@ class OccupancyMap {
   // afterwards.
   std::uint32_t add_soft(std::uint32_t count) { return soft_.add(count); }
   void place(std::uint32_t number, const glm::dvec3& position) { soft_.place(number, position); }
-  // Makes room for this many more bricks without allocation. Call once, after everything is placed. A voxel
-  // needs at most one brick, and a brick that its last voxel leaves is free again. Only the bricks (with four
-  // blocks each) occupied at one time count, however far voxels move.
+  // Makes room for `more` further bricks with four blocks each, which then need no allocation. Call it once,
+  // after everything is placed. A voxel needs at most one brick, and a brick that its last voxel leaves is
+  // free again. So only bricks that are occupied at the same time count, however far voxels move.
   void reserve_bricks(std::size_t more);
 
   // ---- in the tick; these do not allocate ----
@@ -58,16 +58,16 @@ class OccupancyMap {
   void move_body(std::uint32_t object, const glm::dvec3& position, const glm::dquat& rotation) noexcept;
   // Does anything lie in a brick that the box touches? The cheapest query: reads no cells.
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
-  // A bit per rigid object (objects beyond 62 share bit 63) with surface in a brick of which the box touches
-  // an occupied cell. A superset of the exact answer, which the surface itself gives.
+  // Bits of the rigid objects that have surface in a brick where the box touches an occupied cell (objects
+  // beyond 62 share bit 63). This is a superset of the exact answer, which the surfaces themselves give.
   [[nodiscard]] std::uint64_t rigid_in(const glm::dvec3& low, const glm::dvec3& high,
                                        Trail& trail) const noexcept;
   [[nodiscard]] std::uint64_t rigid_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept {
     Trail trail;
     return rigid_in(low, high, trail);
   }
-  // Numbers of soft voxels in the cells that the box touches; returns how many were written, at most
-  // out.size().
+  // Writes the numbers of the soft voxels in the cells that the box touches. Returns how many were written,
+  // at most out.size().
   [[nodiscard]] std::size_t soft_in(const glm::dvec3& low, const glm::dvec3& high,
                                     std::span<std::uint32_t> out, Trail& trail) const noexcept {
     return soft_.in(low, high, out, trail.soft);
@@ -84,7 +84,8 @@ class OccupancyMap {
   [[nodiscard]] std::size_t memory_bytes() const;
   // Bricks that contain soft voxels.
   [[nodiscard]] std::size_t soft_bricks() const noexcept { return soft_.bricks(); }
-  // Moves without room for a brick: raise the reserve. The voxel stays known at its last cell.
+  // Number of moves that found no room for a brick: raise the reserve. Such a voxel stays listed in its last
+  // cell.
   [[nodiscard]] std::uint64_t overflows() const { return soft_.overflows(); }
   // Number of districts that moving bodies entered or left since they were added.
   [[nodiscard]] std::uint64_t district_changes() const noexcept { return moving_.district_changes(); }

@@ -9,8 +9,9 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kBlocksOfNewBrick = 4;  // of eight; a surface occupies about half of them
-// Voxels expected in a block on load: a surface has 10, and some blocks are spare for motion.
+constexpr std::size_t kBlocksOfNewBrick = 4;  // per new brick; a surface occupies about half of the eight
+// Voxels expected per block on load. A surface has 10 per block; expecting fewer leaves spare blocks for
+// motion.
 constexpr std::size_t kVoxelsOfBlock = 9;
 
 constexpr std::uint64_t kNoKey = ~std::uint64_t{0};
@@ -67,12 +68,13 @@ void VoxelLayer::seal(std::size_t more_bricks) {
 
 inline void VoxelLayer::insert(std::uint32_t number, const glm::dvec3& position, bool may_allocate) {
   const CellCoordinates to = bricks_.cell_of(position);
-  // Most voxels are still in their cell, and need no look at their block.
+  // Most voxels are still in their cell, so their block need not be read.
   const std::uint64_t key = key_of(to);
   if (key != kNoKey && key_[number] == key) return;
   const CellCoordinates block = block_of(to);
   const std::uint32_t cell = cell_in_block(to), hint = hinted_brick(brick_of_block(block));
-  // Fetched together with the block that the voxel leaves, whose place is known: one wait for both.
+  // The new block is fetched together with the block that the voxel leaves, whose place is known. So there is
+  // one wait for both.
   if (hint == kNone && blocks_.large()) blocks_.prefetch(block);
   const std::uint32_t old = cell_[number];
   if (old == kNone) {
@@ -96,7 +98,8 @@ inline void VoxelLayer::insert(std::uint32_t number, const glm::dvec3& position,
     cell_[number] = place * kBlockCells + cell;
     return;
   }
-  // Removed first, so that its room is free for the insertion: a voxel that was alone needs no other.
+  // The voxel is removed first, so that its room is free for the insertion. A voxel that was alone in its
+  // brick therefore needs no other room.
   const CellCoordinates old_block = left.at;
   remove(number, left, old_cell);
   if (left.occupied == 0) remove_block(place);
@@ -129,7 +132,7 @@ inline bool VoxelLayer::move_within(std::uint32_t number, Block& block, std::uin
   }
   std::size_t n = bits_in(others & (from_bit - 1));
   if (block.links[n] != number) return false;
-  // Only links between the two cells move; none for the next cell along x.
+  // Only links of cells between the two move. There are none if the cells are neighbours along x.
   if (to > from) {
     for (std::uint64_t bits = others & (to_bit - from_bit); bits != 0; bits &= bits - 1, ++n)
       block.links[n] = block.links[n + 1];

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The soft layer of the occupancy map: surface voxels, one by one, each in the list of its cell, moved in
-// O(1).
+// The soft layer of the occupancy map. Each surface voxel is in the list of its cell and is moved in O(1).
 //
-// Blocks of 4×4×4 cells are in a hash table, two cache lines each, with the first voxel of every occupied
-// cell packed in the order of cells; a surface occupies 10 to 20 of the 64. A query of one cell therefore
-// waits for memory once, where a chain of bricks, blocks and lists waits three times. A block with too many
-// occupied cells has an array of its own. Bricks of 2×2×2 blocks have the places of their blocks: for boxes,
-// for voxels that move between blocks, and for queries that only ask whether anything is near.
+// Blocks of 4×4×4 cells are in a hash table. A block takes two cache lines and contains the first voxel of
+// every occupied cell, packed in the order of cells. A surface occupies 10 to 20 of the 64 cells. A query of
+// one cell therefore waits for memory once; a chain of bricks, blocks and lists would wait three times. A
+// block with too many occupied cells has an array of its own. Bricks of 2×2×2 blocks contain the places of
+// their blocks. They serve boxes, voxels that move between blocks, and queries that only ask whether anything
+// is near.
 #pragma once
 
 #include <array>
@@ -31,16 +31,16 @@ class VoxelLayer {
   // ---- on load; these allocate ----
   std::uint32_t add(std::uint32_t count);  // returns the first of their numbers
   void place(std::uint32_t number, const glm::dvec3& position);
-  // Makes room for this many more bricks, each with four blocks, and for as many full blocks.
+  // Makes room for `more_bricks` further bricks, each with four blocks that may all be full.
   void seal(std::size_t more_bricks);
 
   // ---- in the tick ----
-  // Without room the voxel stays known at its last cell, and overflows() counts it.
+  // If there is no room, the voxel stays listed in its last cell, and overflows() counts it.
   void move(std::uint32_t number, const glm::dvec3& position) noexcept;
   // Is there a voxel in a brick that the box touches?
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
-  // Voxels of the cells that the box touches, in the order of bricks along x, y, z, then blocks, then cells;
-  // in a cell the latest insertion comes first.
+  // Writes the voxels of the cells that the box touches, and returns how many. They are in the order of
+  // bricks along x, y, z, then blocks, then cells. In a cell the latest insertion comes first.
   [[nodiscard]] std::size_t in(const glm::dvec3& low, const glm::dvec3& high, std::span<std::uint32_t> out,
                                Trail& trail) const noexcept;
 
@@ -54,7 +54,7 @@ class VoxelLayer {
  private:
   static constexpr int kBlockShift = 2, kBlockEdge = 4, kBlockCells = 64;
   static constexpr std::size_t kPacked = 25;
-  // With fewer occupied cells a full block's array is freed.
+  // A full block's array is freed when fewer cells than this are occupied.
   static constexpr std::size_t kUnpackBelow = 17;
   // A link is a voxel's number and a flag: kMore means that next_ has the link to another voxel of the cell.
   // For a voxel that is alone in its cell, as nearly all are, next_ is not read.
@@ -66,7 +66,7 @@ class VoxelLayer {
     std::uint64_t occupied = 0;  // bit x + 4 y + 16 z of occupied cells
     std::uint32_t brick = kNone;
     std::array<std::uint32_t, kPacked> links;  // one per occupied cell; the rest is undefined
-    Block() noexcept {}                        // NOLINT: links stay uninitialised, a cache line of memory
+    Block() noexcept {}                        // NOLINT: links stay uninitialised, a cache line not written
     void start(const CellCoordinates& block) noexcept {
       at = block;
       full = kNone;
@@ -83,7 +83,7 @@ class VoxelLayer {
       blocks = 0;
     }
   };
-  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; if free: [0] is the next free one
+  using Full = std::array<std::uint32_t, kBlockCells>;  // [cell] link; free array: [0] is the next free one
 
   [[nodiscard]] static CellCoordinates block_of(const CellCoordinates& cell) noexcept {
     return {cell[0] >> kBlockShift, cell[1] >> kBlockShift, cell[2] >> kBlockShift};
@@ -108,7 +108,7 @@ class VoxelLayer {
   [[nodiscard]] static std::size_t rank(const Block& block, std::uint64_t bit) noexcept {
     return bits_in(block.occupied & (bit - 1));
   }
-  // For an occupied cell.
+  // Link of an occupied cell.
   [[nodiscard]] const std::uint32_t& link_at(const Block& block, std::uint32_t cell) const noexcept {
     return block.full == kNone ? block.links[rank(block, 1ULL << cell)] : full_[block.full][cell];
   }
@@ -154,12 +154,12 @@ class VoxelLayer {
   CellTable<Block> blocks_;
   std::vector<Full, HugePages<Full>> full_;
   std::uint32_t free_full_ = kNone;
-  std::vector<std::uint32_t, HugePages<std::uint32_t>> next_;  // [number] link to the next in its cell
+  std::vector<std::uint32_t, HugePages<std::uint32_t>> next_;  // [number] link to the next voxel in its cell
   // [number] place of block · 64 + cell, or kNone.
   std::vector<std::uint32_t, HugePages<std::uint32_t>> cell_;
   std::vector<std::uint64_t, HugePages<std::uint64_t>> key_;  // [number] the cell's coordinates in one word
-  // Bricks of the last insertions, mostly the next one's too. Two, because the sides of a thin surface are
-  // numbered in turns.
+  // Bricks of the last insertions; the next insertion is mostly in one of them. There are two, because the
+  // two sides of a thin object are numbered in turns.
   std::array<std::uint32_t, 2> last_bricks_{};
   std::uint64_t overflows_ = 0;
 };

@@ -10,7 +10,7 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kBatch = 16;                    // blocks of a box that are fetched together
-constexpr std::size_t kLarge = std::size_t{1} << 19;  // bytes: more than the cache of one core
+constexpr std::size_t kLarge = std::size_t{1} << 19;  // bytes; a larger array exceeds the cache of one core
 
 // Compares bits as integers, which takes one branch. If only the sign of a zero differs, in() calls in_box(),
 // which gives the same result.
@@ -21,7 +21,8 @@ bool same_bits(const glm::dvec3& a, const glm::dvec3& b) noexcept {
   return (differ(a.x, b.x) | differ(a.y, b.y) | differ(a.z, b.z)) == 0;
 }
 
-// Bit x + 4 y + 16 z of a block: the cells of the range, which may extend beyond the block.
+// Mask of the cells of a block that are in the range (bit x + 4 y + 16 z). The range may extend beyond the
+// block.
 std::uint64_t block_mask(const CellCoordinates& block, const CellRange& part) noexcept {
   std::array<std::int32_t, 3> from{}, to{};
   for (std::size_t d = 0; d < 3; ++d) {
@@ -36,7 +37,7 @@ std::uint64_t block_mask(const CellCoordinates& block, const CellRange& part) no
   return x & y & z;
 }
 
-// Calls visit(block) for each block of a brick in the range, along x first, until it returns false.
+// Calls visit(block) for each block of a brick in the range, along x first, until visit returns false.
 template <class Visit>
 bool each_block(const CellCoordinates& brick, const CellCoordinates& low, const CellCoordinates& high,
                 const Visit& visit) noexcept {
@@ -119,8 +120,8 @@ std::size_t VoxelLayer::in_box(const glm::dvec3& low, const glm::dvec3& high, st
   if (blocks_.size() == 0) return 0;
   const CellRange cells = bricks_.cells_of(low, high);
   if (!bricks_.may_exist(cells)) return 0;
-  // First the bricks, then their blocks, so that all blocks of a small box, and their arrays, are fetched
-  // from memory together.
+  // Finds the bricks first and then their blocks, so that all blocks of a small box, and their arrays, are
+  // fetched from memory together.
   struct Part {
     std::uint32_t place;
     std::uint64_t bits;

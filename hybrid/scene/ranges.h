@@ -16,7 +16,8 @@ inline constexpr AllowedRange kMaxForceRange_N{1e-6, 1e4};
 inline constexpr AllowedRange kFrictionRange{0.0, 10.0};
 inline constexpr AllowedRange kDampingRange_N_s_per_m{0.0, 1e4};
 inline constexpr double kSmallestSize_m = 1e-9;
-// Height of a texture per period: steeper flanks would be walls that a tool cannot slide over.
+// Largest height of a texture (unit: its period). Steeper flanks would be walls that a tool cannot slide
+// over.
 inline constexpr double kMostTextureHeight = 0.5;
 
 }  // namespace hybrid

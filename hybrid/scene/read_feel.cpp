@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::string_view keys_of_feel[] = {"damping", "friction", "shading", "texture"};
 
-// One number for both, [static, dynamic], or { static = , dynamic = }.
+// Reads `friction`: one number for both coefficients, [static, dynamic], or { static = , dynamic = }.
 void read_friction(const TableReader& table, FeelDescription& out) {
   static constexpr std::string_view keys[] = {"static", "dynamic"};
   const Quantity coefficient{"a friction coefficient", "0.4", 1.0, kFrictionRange.low, kFrictionRange.high};

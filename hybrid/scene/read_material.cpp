@@ -60,9 +60,9 @@ Material read_material(const TableReader& table) {
     table.refuse("energy", words(table.what(), " has both a yield and the trilinear energy"),
                  "take one of them away: what yields is of links");
   }
-  // Rows of voxels that are rigid along one axis and free along another are refused. Relaxation moves voxels
-  // and blocks of them, and neither can move without breaking such a row, so the tissue would stay as it was
-  // pressed.
+  // Refuses materials whose links may slip but not stretch, or stretch but not slip. Relaxation moves single
+  // voxels and blocks of voxels. Neither can move without violating the limits of such links, so tissue would
+  // stay as it was pressed.
   const bool stretches = out.stretch_max > out.stretch_min, slips = out.shear > 0.0;
   if (stretches != slips) {
     table.refuse(

@@ -80,7 +80,7 @@ device::CsvPath read_csv(const TableReader& table) {
   return out;
 }
 
-// Duration of the path; 0 for a CSV file, whose duration is unknown until it is read.
+// Duration of the path (s); 0 for a CSV file, whose duration is unknown until it is read.
 double seconds(const device::PathDescription& path) {
   if (const auto* press = std::get_if<device::PressPath>(&path)) {
     const double leg_s = glm::distance(press->from_m, press->to_m) / press->speed_m_per_s;

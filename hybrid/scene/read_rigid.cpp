@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The common keys of all objects, and the [[rigid]] tables.
+// Reads the keys that all objects have in common, and the [[rigid]] tables.
 #include "hybrid/scene/read_rigid.h"
 
 #include <algorithm>
@@ -30,7 +30,7 @@ bool usable_name(const std::string& name) {
   return !name.empty() && name.size() <= longest_name && !has_control;
 }
 
-// Rotations about the scene's own x, then y, then z axis.
+// Rotation about the scene's x axis, then about its y axis, then about its z axis.
 glm::dquat rotation_from_degrees(const glm::dvec3& degrees) {
   const glm::dvec3 half = degrees * (glm::pi<double>() / 360.0);
   const glm::dquat about_x(std::cos(half.x), std::sin(half.x), 0.0, 0.0);

@@ -217,7 +217,7 @@ void check_names(const SceneSource& source, const Scene& scene) {
   for (const SoftDescription& soft : scene.soft) take(soft.name, soft.place);
 }
 
-// Its anchors are near rigid objects only, and there are none.
+// Refuses anchors that are only near rigid objects if the scene has no rigid objects.
 void check_anchors(const TableReader& table, const Scene& scene, const SoftDescription& soft) {
   const bool only_by_rigid = soft.anchors.faces.empty() && soft.anchors.labels.empty();
   if (!only_by_rigid || !scene.rigid.empty()) return;
@@ -235,7 +235,7 @@ void check_point_tool(const SceneSource& source, const Scene& scene, SourcePlace
                 words("give it a radius of about two spacings of \"", scene.soft.front().name, "\""));
 }
 
-// `materials`: whether all of them could be read, so that one that is missing is an error of its own.
+// `materials`: all materials could be read, so that a missing one is an error of its own.
 void read_soft_object(const SceneSource& source, const TreeNode& table, bool materials, Scene& scene) {
   scene.soft.push_back(read_soft(source, table, scene.soft.size() + 1));
   const SoftDescription& soft = scene.soft.back();
@@ -261,7 +261,7 @@ void read_objects(const SceneSource& source, const TableReader& root, bool mater
     for (const TreeNode& table : object_tables(root, "soft"))
       source.gather([&] { read_soft_object(source, table, materials, scene); });
   });
-  if (source.found() != before) return;  // what follows is about all objects
+  if (source.found() != before) return;  // the checks below involve all objects
   if (scene.rigid.empty() && scene.soft.empty()) {
     source.refuse({1, 1}, "the scene has no objects",
                   "add a [[rigid]] or a [[soft]] table (see scenes/README.md)");
@@ -269,7 +269,7 @@ void read_objects(const SceneSource& source, const TableReader& root, bool mater
   check_names(source, scene);
 }
 
-// All of them in one, a line each, in the order of the file.
+// Throws all errors as one, with a line for each, in the order of the file.
 [[noreturn]] void throw_all(const std::filesystem::path& file, std::vector<ReaderError>& errors) {
   std::stable_sort(errors.begin(), errors.end(), [](const ReaderError& a, const ReaderError& b) {
     return std::pair(a.place.line, a.place.column) < std::pair(b.place.line, b.place.column);

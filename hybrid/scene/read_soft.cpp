@@ -22,7 +22,8 @@ constexpr UnsupportedKey energies_later[] = {
     {"18-link", "write energy = \"trilinear\", which is as accurate"},
 };
 
-// Largest number of voxels along one axis: indices stay far inside an int, and a row inside a cache.
+// Largest number of voxels along one axis: indices stay far below the limit of an int, and a row fits into a
+// cache.
 constexpr double most_voxels_per_axis = 100'000.0;
 
 voxel::Layer read_layer(const TableReader& table) {
@@ -52,7 +53,7 @@ voxel::Inclusion read_inclusion(const TableReader& table, const voxel::Formula& 
   return out;
 }
 
-// The lattice must fit, and have at least one voxel, before anything is allocated for it.
+// Refuses a lattice that does not fit into memory or has no voxel, before anything is allocated for it.
 void check_lattice(const TableReader& table, const voxel::Formula& formula) {
   const SceneSource& source = table.source();
   std::string lattice;
@@ -180,9 +181,9 @@ Anchors read_anchors(const TableReader& soft, const std::set<int>& known) {
   table.allow(keys);
   out.faces.clear();  // named anchors replace the default
   const TreeEntry* listed_faces = table.find("faces");
-  const bool no_faces =
-      listed_faces != nullptr && listed_faces->value.kind == TreeNode::Kind::array &&
-      listed_faces->value.items.empty();  // an explicit empty list; reported below if it matters
+  // An explicit empty list is refused below if nothing else holds the object.
+  const bool no_faces = listed_faces != nullptr && listed_faces->value.kind == TreeNode::Kind::array &&
+                        listed_faces->value.items.empty();
   if (listed_faces != nullptr && !no_faces) {
     for (const TreeNode& face : table.list("faces", "[\"-z\"]").items) {
       if (face.kind != TreeNode::Kind::string ||

@@ -27,7 +27,7 @@
 
 namespace hybrid {
 
-// A place in the scene file (1-based). Line 0: absent there, so that a default applies.
+// A place in the scene file (1-based). Line 0: the key is absent, and a default applies.
 struct SourcePlace {
   std::uint32_t line = 0, column = 0;
 };
@@ -47,10 +47,10 @@ struct Material {
   double poisson = 0.3;      // 0 <= ν < 0.5
   double stretch_min = 0.4;  // shortest length of a link, as a fraction of its rest length; 0 < min <= 1
   double stretch_max = 1.6;  // longest length; >= 1
-  double shear = 0.6;  // largest slip of a link's ends across it, as a fraction of its rest length; >= 0
+  double shear = 0.6;        // largest slip of a link's ends across it (unit: its rest length); >= 0
   // Strain beyond which a link at rest keeps the excess as plastic strain; > 0.
   double yield = std::numeric_limits<double>::infinity();
-  std::optional<Energy> energy{};  // empty: that of its object
+  std::optional<Energy> energy{};  // empty: the object's energy
   SourcePlace place;
 };
 
@@ -68,11 +68,11 @@ struct BoxPrimitive {
   glm::dvec3 size_m{0.0};
 };
 struct PlanePrimitive {
-  double size_m = 0.0;
-};  // edge of the square sheet
+  double size_m = 0.0;  // edge of the square sheet
+};
 struct CapsulePrimitive {
-  double radius_m = 0.0, length_m = 0.0;
-};                 // length between the two centres
+  double radius_m = 0.0, length_m = 0.0;  // length: between the two centres
+};
 struct CutPlane {  // the half-space that the normal points into is cut away, in the scene frame
   glm::dvec3 normal{0.0, 0.0, 1.0};
   double offset_m = 0.0;
@@ -86,31 +86,31 @@ struct VolumeSurfaceSource {
   int smooth = 10;      // smoothing passes
   bool largest = true;  // keep only the largest connected piece, and fill its cavities
   std::vector<CutPlane> cuts;
-  // Length unit of the file's numbers. Without a value, the file's own: what its header states, else mm.
+  // Length unit of the file's numbers; default: the unit that the file's header states, otherwise mm.
   std::optional<double> unit_m;
 };
 using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlanePrimitive, CapsulePrimitive,
                                  VolumeSurfaceSource>;
-// A rigid object with prescribed motion, which no contact changes. `position` and `rotation` are its pose at
-// the start.
-struct SpinDescription {           // rotation about an axis that moves along with the path
+// Prescribed motion of a rigid object, which no contact changes. The object's `position` and `rotation` are
+// its pose at the start.
+struct SpinDescription {           // rotation about an axis that follows the path
   glm::dvec3 axis{0.0, 0.0, 1.0};  // unit vector, scene frame
   glm::dvec3 about_m{0.0};         // a point of the axis at the start, scene frame
-  double rate_rad_per_s = 0.0;     // endless rotation; or an oscillation:
+  double rate_rad_per_s = 0.0;     // endless rotation, if amplitude_rad is 0
   double amplitude_rad = 0.0, frequency_hz = 0.0;
 };
 struct PathMotion {
-  // Relative to the path's first point: at its start the object has its own pose.
+  // Positions count relative to the path's first point, so at the start the object has its own pose.
   std::optional<device::PathDescription> path;
   std::optional<SpinDescription> spin;
 };
 // A rigid object that moves under contact forces.
 struct FreeMotion {
   std::optional<double> mass_kg, density_kg_per_m3;  // exactly one of them
-  // About axes parallel to the object's, through its centre of mass; default: of its closed shape, filled
-  // evenly.
+  // Moments of inertia about axes through the centre of mass that are parallel to the object's axes. Default:
+  // those of the closed shape, filled evenly.
   std::optional<glm::dvec3> inertia_kg_m2;
-  std::optional<glm::dvec3> centre_m;  // of mass, in the object's own frame; default: of its closed shape
+  std::optional<glm::dvec3> centre_m;  // centre of mass in the object's frame; default: of the closed shape
   double drag_N_s_per_m = 0.0, angular_drag_N_m_s = 0.0;
   glm::dvec3 gravity_m_per_s2{0.0};
 };
@@ -141,7 +141,7 @@ struct RigidDescription {
   FeelDescription feel{};
   MotionDescription motion{};
   SourcePlace motion_place{};  // of the key that sets the motion
-  bool as_mesh = false;        // render a primitive as its tessellation: for comparisons, no key of a scene
+  bool as_mesh = false;        // render a primitive as a mesh, for comparisons; not a key of scenes
   SourcePlace place;           // of the table
   SourcePlace source_place;    // of the key that names the source
 };
@@ -153,7 +153,7 @@ struct VolumeSource {
   std::vector<voxel::LabelRule> rules;
   std::optional<glm::dvec3> spacing_m;
   bool largest = true;  // keep only the largest connected piece
-  // Length unit of the file's numbers. Without a value, the file's own: what its header states, else mm.
+  // Length unit of the file's numbers; default: the unit that the file's header states, otherwise mm.
   std::optional<double> unit_m;
 };
 struct ClosedMeshSource {
@@ -171,14 +171,14 @@ struct Anchors {
 };
 // Fewer voxels in the interior of stiff tissue; see voxel/volume/interior_coarsening.h.
 struct Thinning {
-  std::vector<std::uint8_t> labels;  // empty: labels whose material is at least this stiff
+  std::vector<std::uint8_t> labels;  // empty: those with Young's modulus of at least above_Pa
   double above_Pa = 0.0;
   int every = 3;
   int shell = 2;  // default: every - 1
   SourcePlace place;
 };
-// How the object is rendered: by its voxels, by the proxy as a rigid object, or automatically by whichever is
-// enough.
+// How the object is rendered: by its voxels, by the proxy as a rigid object, or by the proxy if that is
+// enough (automatic).
 enum class SoftModel : std::uint8_t { voxels, proxy, automatic };
 struct SoftDescription {
   std::string name;
@@ -191,7 +191,8 @@ struct SoftDescription {
   SourcePlace budget_place{};     // of the key; line 0: the default
   std::optional<Thinning> thinning{};
   Energy energy = Energy::six_link;  // for materials without their own
-  // Always `voxels` in Scene::soft of a loaded scene: the model of others has been decided.
+  // As in the file. load_scene() moves objects that are felt through the proxy to Scene::rigid, so all that
+  // stay in Scene::soft are felt through their voxels.
   SoftModel model = SoftModel::voxels;
   SourcePlace place, source_place;
 };
@@ -234,9 +235,9 @@ struct Scene {
   // Simulated, unless real_device is set.
   device::DeviceModel device_model = device::DeviceModel::premium_1_5;
   std::optional<RealDevice> real_device;
-  std::optional<device::DeviceLimits> opened_limits;  // of an open real device; else the model's
+  std::optional<device::DeviceLimits> opened_limits;  // limits of an open real device; empty: the model's
   double rate_hz = 1000.0;
-  // Of a simulated device and its hand.
+  // Settings of a simulated device and its hand.
   int delay_ticks = 0;
   std::optional<double> watchdog_s;
   device::HandTremor tremor;
@@ -244,16 +245,16 @@ struct Scene {
   device::PathDescription path;
   SourcePlace path_place;
   device::ForceLimits safety;    // its deadline is set by deadline_periods
-  bool max_force_given = false;  // else the device's own limit applies
-  // Else an ideal device has no limit: its motion does not depend on the force.
+  bool max_force_given = false;  // false: the device's own limit applies
+  // False: an ideal device has no energy limit, because its motion does not depend on the force.
   bool max_energy_given = false;
   double deadline_periods = 10.0;
   bool passivity = false;
 };
 
-// Largest lattice of a soft object on this machine. Building it takes lattice_bytes_per_voxel for each voxel
-// of the bounding box (labels, surface and temporary copies; 2.6 bytes in 512³ voxels), within the physical
-// memory.
+// Largest number of voxels in a soft object's lattice that fits into this machine's physical memory. Building
+// a lattice takes up to lattice_bytes_per_voxel for each voxel of the bounding box (labels, surface and
+// temporary copies; 2.6 bytes with 512³ voxels).
 inline constexpr std::size_t lattice_bytes_per_voxel = 4;
 std::size_t max_lattice_voxels();
 

@@ -40,7 +40,7 @@ void SceneSource::refuse(SourcePlace place, const std::string& what, const std::
 }
 
 void SceneSource::keep(const ReaderError& error) const {
-  constexpr std::size_t kMost = 100;  // of a file that is no scene at all
+  constexpr std::size_t kMost = 100;  // a file with more errors is no scene at all
   if (errors == nullptr || errors->size() >= kMost) throw error;
   errors->push_back(error);
 }
@@ -128,7 +128,7 @@ void TableReader::allow(std::span<const std::string_view> keys, std::span<const 
       refuse_key(entry, keys, later, elsewhere, condition);
     } catch (const ReaderError& error) {
       has_unknown_ = true;
-      if (!found_at(source_, error.place)) source_.keep(error);  // a table may be looked at twice
+      if (!found_at(source_, error.place)) source_.keep(error);  // allow() may be called twice for a table
     }
   }
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads the keys of one table of a scene file: types, units, bounds and unknown keys. Every refusal names its
-// place. Where errors are gathered, a number, text or file that is wrong is kept as an error and read as some
-// value that is right, so that all keys of a table are looked at; a rule among several keys is only an error
-// where nothing else is wrong in the table.
+// place. If errors are gathered, a wrong number, text or file is kept as an error and replaced by some valid
+// value, so that all keys of a table are checked. A violated rule among several keys is an error only if
+// nothing else is wrong in the table.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ struct Quantity {
   double lower = 0.0, upper = 0.0;
 };
 
-// An error that others can be found beside.
+// An error after which reading can go on to find others.
 struct ReaderError : SceneError {
   ReaderError(const std::filesystem::path& file, SourcePlace where, const std::string& what_and_remedy)
       : SceneError(file, where, what_and_remedy), place(where), text(what_and_remedy) {}
@@ -42,14 +42,15 @@ struct SceneSource {
   double unit_m = 1e-3;
   std::string unit_name = "mm";
 
-  // Where errors go that do not keep others from being found; null: each one is thrown.
+  // List of the errors after which reading goes on; null: each error is thrown.
   std::vector<ReaderError>* errors = nullptr;
 
   [[noreturn]] void refuse(SourcePlace place, const std::string& what, const std::string& remedy) const;
-  // Keeps the error for the end of the reading, or throws it where nothing is kept, or too many are.
+  // Keeps the error until the end of reading. Throws it if errors are not kept, or if too many are.
   void keep(const ReaderError& error) const;
   [[nodiscard]] std::size_t found() const { return errors == nullptr ? 0 : errors->size(); }
-  // Calls read(), and keeps an error that it throws, unless others were found in it: it may follow from them.
+  // Calls read(), and keeps an error that read() throws. If read() kept other errors before, the thrown one
+  // is dropped, because it may follow from them.
   template <typename Read>
   void gather(const Read& read) const {
     const std::size_t before = found();
@@ -62,7 +63,7 @@ struct SceneSource {
   [[nodiscard]] Quantity length() const;    // any sign
   [[nodiscard]] Quantity size() const;      // above 0
   [[nodiscard]] Quantity distance() const;  // 0 or more
-  [[nodiscard]] Quantity speed() const;     // above 0, lengths a second
+  [[nodiscard]] Quantity speed() const;     // above 0, in lengths per second
 };
 
 // A key or a value that is not supported yet.
@@ -85,8 +86,8 @@ class TableReader {
   // `what` names the table in messages: "[tool]", "[[soft]] 'brain'".
   TableReader(const SceneSource& source, const TreeNode& table, SourcePlace place, std::string what);
 
-  // Refuses every key that is neither in `keys` nor in `elsewhere`. Keys of `later` get their own message,
-  // and keys of `elsewhere` are reported as unused with `condition`. Call it first, so that a misspelt key is
+  // Refuses every key that is not in `keys`. The message says that keys of `later` are not supported yet, and
+  // that keys of `elsewhere` have no meaning with `condition`. Call it first, so that a misspelt key is
   // reported as such and not as a missing one.
   void allow(std::span<const std::string_view> keys, std::span<const UnsupportedKey> later = {},
              std::span<const std::string_view> elsewhere = {}, std::string_view condition = {}) const;
@@ -136,13 +137,13 @@ class TableReader {
                                  const Quantity& quantity) const;
 
  private:
-  // What read() returns, or `otherwise` after an error.
+  // Returns the value of read(), or `otherwise` after an error.
   template <typename Value, typename Read>
   [[nodiscard]] Value value_or(std::string_view key, Value otherwise, const Read& read) const {
     try {
       return read();
     } catch (const ReaderError& error) {
-      // A key that is missing beside an unknown one is probably that one.
+      // If a key is missing and another is unknown, the unknown key is probably the missing one, misspelt.
       if (!has_unknown_ || has(key)) source_.keep(error);
       return otherwise;
     }

@@ -18,7 +18,7 @@ constexpr Tissue bone(std::string_view name, std::string_view patterns) {
 
 constexpr std::array kTissues{
     // clang-format off
-    // Before the bones, whose patterns would take them.
+    // These come before the bones, whose patterns also fit them.
     Tissue{"cartilage", "*cartilage* *menisc* *disc *intervertebral*", false, 7.0e5, 0.10, true,
            "human femoral condyle, aggregate modulus 0.70 MPa, Athanasiou et al. 1991, J Orthop Res 9:330", {0.76F, 0.86F, 0.90F}},
     Tissue{"spinal cord", "*spinal_cord* *spinal?cord* *medulla_spinalis*", false, 2.5e3, 0.45, false,
@@ -34,7 +34,7 @@ constexpr std::array kTissues{
     bone("sternum", "sternum*"),
     bone("skull", "skull* *_skull* *cranium* *mandible* *maxilla*"),
     bone("bone", "*bone* *tibia* *fibula* *patella* *radius* *ulna* *carpal* *tarsal* *phalan* *teeth* *tooth*"),
-    // Before the organs that they are named for.
+    // Vessels come before the organs that they are named after.
     Tissue{"vessel", "*aorta* *artery* *arteri* *vein* *vena* *cava* *vessel* *trunk*", false, 1.0e5, 0.45, false,
            "a wall around blood: order of the aorta's pressure-strain modulus, 100 kPa", {0.80F, 0.15F, 0.15F}},
     Tissue{"liver", "*liver* *hepat*", false, 5.5e3, 0.45, true,
@@ -94,8 +94,8 @@ const Tissue& unknown_tissue() {
 }
 
 bool fits_pattern(std::string_view name, std::string_view pattern) {
-  // Where a star's share of the name turns out too short, it takes one character more: only the last star
-  // has to be tried again, so this takes at most the product of the lengths.
+  // If the rest of the name does not fit, the last star takes one more character. Earlier stars need not be
+  // tried again, so the number of steps is at most the product of both lengths.
   std::size_t n = 0, p = 0, star = std::string_view::npos, retry = 0;
   while (n < name.size()) {
     if (p < pattern.size() && pattern[p] == '*') {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tissues by their names: bone or not, how stiff, with the source of the figure, and the customary colour in
-// anatomical drawings.
+// A table of tissues by name: whether they are bone, their stiffness with its source, and their customary
+// colour in anatomical drawings.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -11,24 +11,25 @@
 namespace hybrid {
 
 struct Tissue {
-  std::string_view name;      // of the family: "rib", "liver", "vessel"; also of its material in a scene
-  std::string_view patterns;  // of label names, with spaces between; '*' and '?' stand for any characters
+  std::string_view name;      // of the tissue family and of its material in a scene: "rib", "liver"
+  std::string_view patterns;  // of label names, separated by spaces; '*' and '?' stand for any characters
   bool bone = false;          // felt as a rigid surface; the figures below are then not used
   double young_Pa = 0.0;
   double poisson = 0.0;
-  bool measured = false;    // published for this tissue; else a stand-in, and `source` says which
-  std::string_view source;  // where the figure is from
-  glm::vec3 colour{0.0F};   // sRGB, 0 to 1: of the tissue in pictures
+  bool measured = false;    // figures of this tissue; false: stand-ins, which `source` explains
+  std::string_view source;  // where the figures are from
+  glm::vec3 colour{0.0F};   // colour of the tissue in pictures; sRGB, 0 to 1
 };
 
-// The first row wins. Young's moduli are of small, slow deformation in living tissue where there is such a
-// measurement; elastography gives E = 3·ρ·c². Poisson's ratio: what does not change its volume gets 0.45,
-// near which the lattice's calibration ends.
+// The first row that fits a name is used. Young's moduli are those of small, slow deformations of living
+// tissue, where such measurements exist. Elastography gives E = 3·ρ·c². Tissue that does not change its
+// volume has a Poisson's ratio of 0.45, near the end of the range for which the lattice is calibrated.
 std::span<const Tissue> tissue_table();
 
-// A tissue as a scene of six-link voxels has it. They are right for Poisson's ratios up to 0.3 in layers,
-// too, and a fifth too soft at 0.45 (voxel/README.md). Objects on nested patches have one ratio. So the ratio
-// is 0.3, and Young's modulus keeps the contact modulus E/(1 − ν²), which a tool feels.
+// Elastic constants for a tissue of six-link voxels. Such voxels are accurate for Poisson's ratios up to 0.3,
+// also in layers, and a fifth too soft at 0.45 (voxel/README.md). Objects on nested patches can have only one
+// ratio. So the ratio is 0.3, and Young's modulus is chosen to keep the contact modulus E/(1 − ν²), which a
+// tool feels.
 struct LatticeStiffness {
   double young_Pa = 0.0, poisson = 0.0;
 };
@@ -37,10 +38,10 @@ LatticeStiffness as_six_links(const Tissue& tissue);
 // The row that a label's name belongs to; null when there is none.
 const Tissue* find_tissue(std::string_view label_name);
 
-// What a label gets that no row knows.
+// The tissue of a label that fits no row.
 const Tissue& unknown_tissue();
 
-// Whether a name fits a pattern of '*' (any characters, also none) and '?' (one), capitals ignored.
+// Does a name fit a pattern of '*' (any characters, also none) and '?' (one character)? Case is ignored.
 bool fits_pattern(std::string_view name, std::string_view pattern);
 
 }  // namespace hybrid

@@ -15,8 +15,8 @@ bool is_blank(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-// Scans over strings and comments as TOML 1.0 delimits them, and examines the rest. If the text is no valid
-// TOML the scan may differ from the parser's, but only after the place where the parser stops.
+// Skips strings and comments as TOML 1.0 delimits them, and examines the rest. If the text is no valid TOML
+// the scan may differ from the parser's, but only after the place where the parser stops.
 class Screen {
  public:
   Screen(std::string_view text, const std::filesystem::path& file) : text_(text), file_(file) {}
@@ -57,7 +57,7 @@ class Screen {
       } else if (c == quote && three_quotes(quote)) {
         at_ += 3;
         for (int more = 0; more < 2 && at_ < text_.size() && text_[at_] == quote; ++more)
-          ++at_;  // """"" ends with two
+          ++at_;  // a string may end with up to two quotes of its own
         return;
       } else {
         ++at_;
@@ -65,8 +65,8 @@ class Screen {
     }
   }
 
-  // After a backslash. At the end of a line of a multi-line string it skips all blanks up to the next
-  // character.
+  // Skips the rest of an escape after its backslash. In a multi-line string, a backslash at the end of a line
+  // skips all blanks up to the next character.
   void skip_escape(bool is_long) {
     const std::size_t start = at_;
     while (is_long && at_ < text_.size() && is_blank(text_[at_])) ++at_;
@@ -133,7 +133,8 @@ std::size_t first_not_utf8(std::string_view text) {
   return text.size();
 }
 
-// Latin-1 has a letter or sign for every byte from 0xA0 on, and no other use for those below.
+// Text is taken for Latin-1 if it has no byte from 0x80 to 0x9F: Latin-1 has a letter or sign for every byte
+// from 0xA0 on, and none for those.
 [[noreturn]] void refuse_encoding(std::string_view text, std::size_t at, const std::filesystem::path& file) {
   const bool latin = std::all_of(text.begin(), text.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);
@@ -159,7 +160,7 @@ SourcePlace place_in_text(std::string_view text, std::size_t at) {
   const std::string_view line = last == std::string_view::npos ? before : before.substr(last + 1);
   const auto is_first = [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
-  };  // continuation byte of a character
+  };  // not a continuation byte of a character
   return {static_cast<std::uint32_t>(1 + std::count(before.begin(), before.end(), '\n')),
           static_cast<std::uint32_t>(1 + std::count_if(line.begin(), line.end(), is_first))};
 }

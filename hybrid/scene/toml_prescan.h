@@ -12,16 +12,15 @@ namespace hybrid {
 
 inline constexpr std::size_t most_scene_bytes = 16U * 1024 * 1024;
 inline constexpr std::size_t most_scene_values = 1'000'000;  // about 300 MB at worst during reading
-inline constexpr std::size_t most_key_parts = 64;            // of a.b.c; bounds the depth of the tree
+inline constexpr std::size_t most_key_parts = 64;            // parts of a.b.c; bounds the depth of the tree
 
 // Place of the byte at offset `at`; columns count characters.
 SourcePlace place_in_text(std::string_view text, std::size_t at);
 
-// Throws SceneError if the text is empty, too large, UTF-16, Latin-1 or else not UTF-8, contains a zero byte,
-// too many values or a key of too many parts, or has characters outside ASCII outside strings and comments.
-// No key of a scene has such characters, and on them toml++ 3.3 has undefined behaviour (its test for Unicode
-// white space ends in
-// __builtin_unreachable()).
+// Throws SceneError if the text is empty, too large, UTF-16, Latin-1 or otherwise not UTF-8. It also throws
+// if the text contains a zero byte, too many values, a key of too many parts, or non-ASCII characters outside
+// strings and comments. No key of a scene has non-ASCII characters. They cause undefined behaviour in toml++
+// 3.3, whose test for Unicode white space ends in __builtin_unreachable().
 void prescan_scene_text(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace hybrid

@@ -10,8 +10,9 @@
 #include "hybrid/base/number_text.h"
 #include "hybrid/scene/toml_prescan.h"
 
-// On some malformed files (a header "[=" for one) toml++ 3.3 asserts instead of reporting, and has undefined
-// behaviour without asserts. Here a failed assertion becomes an error of the file.
+// On some malformed files (for example with a header "[=") an assertion of toml++ 3.3 fails instead of an
+// error being reported. Without assertions its behaviour is undefined. Here a failed assertion becomes an
+// error of the file.
 namespace {
 struct ParserGaveUp {};
 [[noreturn]] void give_up() {
@@ -101,7 +102,8 @@ bool parser_gives_up(std::string_view text) {
   return false;
 }
 
-// The parser reads from front to back, so the shortest prefix of the text that fails ends with the culprit.
+// The parser reads from front to back, so the shortest prefix of the text on which it gives up ends at the
+// error.
 SourcePlace where_parser_gives_up(std::string_view text) {
   std::size_t good = 0, bad = text.size();
   while (bad - good > 1) {

@@ -19,9 +19,9 @@ struct TreeEntry;
 
 struct TreeNode {
   enum class Kind : std::uint8_t { table, array, string, integer, real, boolean, date } kind = Kind::table;
-  SourcePlace place;               // of the value; for a [table] of its header
+  SourcePlace place;               // place of the value, or of the header of a [table]
   std::string text;                // string
-  double number = 0.0;             // integer and real; may be infinite or not a number
+  double number = 0.0;             // integer and real; may be infinite or NaN
   std::int64_t integer = 0;        // integer
   bool boolean = false;            // boolean
   std::vector<TreeNode> items;     // array

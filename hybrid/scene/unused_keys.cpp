@@ -7,7 +7,7 @@
 namespace hybrid {
 namespace {
 
-// The tables of `key` in the order of the file; those of scene.rigid and scene.soft.
+// The tables of `key` in the order of the file, which is also that of scene.rigid and scene.soft.
 std::vector<const TreeNode*> tables_of(const TableReader& root, std::string_view key) {
   std::vector<const TreeNode*> tables;
   const TreeEntry* entry = root.find(key);

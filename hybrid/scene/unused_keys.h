@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keys of a scene file that are right by themselves and have no effect beside the others.
+// Finds keys of a scene file that are valid by themselves but have no effect with the other keys.
 #pragma once
 
 #include "hybrid/scene/scene.h"

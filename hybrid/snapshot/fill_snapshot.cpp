@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kNodesInside = 24;  // along the longest edge of an object: displacements for a cut
+constexpr int kNodesInside = 24;  // nodes along an object's longest edge; their displacements are for a cut
 
 void fill_places(const World& world, const WorldState& state, Snapshot& snapshot) {
   snapshot.rigid_place.resize(world.rigid.size());
@@ -29,8 +29,8 @@ void fill_surface(const SoftBody& body, const voxel::SoftObject& object, std::ve
     moved[v] = glm::vec3(body.pose.rotation * object.displacement_at(body.drawn.vertices[v]));
 }
 
-// Copies the nodes: a few hundred kilobytes, however large the object. Its surface, vertex by vertex, would
-// take a hundred milliseconds.
+// Copies the displacements at the patches' nodes: a few hundred kilobytes, however large the object is.
+// Displacements of all surface vertices would take 100 ms.
 void fill_dent(const SoftBody& body, const voxel::SoftObject& object, SoftDent& dent) {
   dent.used = true;
   dent.count = 0;

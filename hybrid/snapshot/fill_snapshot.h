@@ -9,10 +9,10 @@ namespace hybrid {
 
 // Fills the places of everything that moves. Allocates nothing once the vectors have their sizes.
 void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot);
-// The same from within a tick that must not wait: for a soft object under asynchronous relaxation only the
-// neighbourhood of the tool.
+// Does the same within a tick that must not wait. A soft object on nested patches gets only their nodes, and
+// one under asynchronous relaxation only the neighbourhood of the tool.
 void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot);
-// The present values of what may be edited. Allocates nothing once `values` has its size.
+// Fills the present values of DrawnScene::editable. Allocates nothing once `values` has its size.
 void fill_values(const World& world, const WorldState& state, const DrawnScene& drawn, Snapshot& snapshot);
 // Adds the displacements within each touched soft object, on a coarse grid: for the cut of a picture.
 void fill_inside(const World& world, const WorldState& state, Snapshot& snapshot);

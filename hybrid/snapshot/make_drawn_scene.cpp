@@ -13,8 +13,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kDrawnPoint = 0.004;           // of the scene: smallest drawn radius of a tool
-constexpr std::size_t kMostInside = 1U << 24U;  // cells of an object whose inside is kept for a cut
+constexpr double kDrawnPoint = 0.004;           // smallest drawn radius of a tool (unit: the scene's extent)
+constexpr std::size_t kMostInside = 1U << 24U;  // most cells of an object whose inside is kept for a cut
 
 // The material of most voxels around a vertex. A vertex lies within one cube between eight voxel centres, of
 // which at least one is filled. Ties go to the material that was named first.
@@ -57,7 +57,8 @@ std::vector<double> area_of_materials(const polygon::TriangleMesh& mesh,
   return area;
 }
 
-// The materials voxel by voxel, if the surface hides one of them. `shown`: numbers of the visible ones.
+// Adds the materials voxel by voxel, if the surface hides one of them. `shown`: numbers of the visible
+// materials.
 void add_inside(DrawnObject& drawn, const SoftBody& body, const voxel::Lattice& lattice,
                 const MaterialsOfLabels& materials, const std::vector<std::uint8_t>& shown) {
   const std::array<int, 3> dims = lattice.grid().dims;

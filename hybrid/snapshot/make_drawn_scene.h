@@ -10,9 +10,9 @@
 
 namespace hybrid {
 
-// Surfaces at rest; for soft objects with the materials beneath them. Labels are read from the lattices, so a
-// scene that is not drawn stores nothing for this, and a drawn one stores a byte per vertex of an object with
-// several visible materials. `built` must be of `scene`.
+// Returns the surfaces at rest. Those of soft objects also have the materials beneath them. Labels are read
+// from the lattices, so a scene that is not drawn stores nothing for drawing. A drawn scene stores a byte per
+// vertex of each object with several visible materials. `built` must have been built from `scene`.
 DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::string& title);
 
 }  // namespace hybrid

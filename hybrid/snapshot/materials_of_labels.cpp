@@ -19,7 +19,7 @@ MaterialsOfLabels materials_of_labels(const SoftDescription& description, const 
     const std::string& name = own != description.materials.end() ? own->second : description.material;
     result.of_label[label] = number_of(name.empty() ? kUnnamed : name);
   }
-  // A strut has the tissue that it replaces.
+  // A strut has the material of the tissue that it replaces.
   for (const auto& [strut, label] : body.struts) result.of_label[strut] = result.of_label[label];
   return result;
 }

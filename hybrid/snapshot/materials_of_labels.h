@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The names of a soft object's materials, as pictures, plots and reports say them.
+// The names of a soft object's materials, as pictures, plots and reports show them.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace hybrid {
 
-inline constexpr const char* kUnnamed = "default material";  // of labels without a material of their own
+inline constexpr const char* kUnnamed = "default material";  // name for labels whose material is not named
 
 // The material of each label, as a number and by name.
 struct MaterialsOfLabels {

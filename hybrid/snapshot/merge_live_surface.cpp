@@ -10,14 +10,15 @@
 namespace hybrid {
 namespace {
 
-// Vertices within the patch follow the near points of the tick, weighted by inverse distance.
+// Vertices within the patch follow the tick's points near them, weighted by the inverse square of their
+// distance.
 void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std::vector<glm::vec3>& moved) {
   glm::vec3 low = patch.at_rest_m.front(), high = low;
   for (const glm::vec3& at : patch.at_rest_m) {
     low = glm::min(low, at);
     high = glm::max(high, at);
   }
-  // Mean distance between n points on an area.
+  // Mean distance between the points, if they are spread evenly over a square of the patch's largest size.
   const glm::vec3 size = high - low;
   const float apart = std::max({size.x, size.y, size.z}) /
                       std::sqrt(static_cast<float>(std::max<std::size_t>(patch.at_rest_m.size(), 1)));
@@ -40,7 +41,7 @@ void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std
 
 }  // namespace
 
-// Interpolated between the nodes of the finest box that contains the point.
+// Interpolates between the nodes of the finest box that contains the point.
 glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
   const glm::dvec3 point = ((at_rest_m - origin_m) * to_scene) / spacing_m;  // v · R is Rᵀ v
   for (std::size_t n = 0; n < count; ++n) {

@@ -22,10 +22,10 @@ namespace hybrid {
 // The materials within a soft object, voxel by voxel.
 struct DrawnInside {
   std::array<int, 3> dims{};                 // voxels; all 0: not known
-  glm::dmat3 to_scene{1};                    // of the object's axes
-  glm::dvec3 origin_m{0.0}, spacing_m{1.0};  // the middle of voxel (0, 0, 0), in the scene frame
+  glm::dmat3 to_scene{1};                    // rotation from the object's axes to the scene's
+  glm::dvec3 origin_m{0.0}, spacing_m{1.0};  // origin: middle of voxel (0, 0, 0), scene frame
   std::vector<std::string> materials{};      // those that the surface shows come first
-  std::vector<std::uint8_t> of_voxel{};      // x fastest: 0: empty, else 1 + index into `materials`
+  std::vector<std::uint8_t> of_voxel{};      // x fastest; 0: empty, else 1 + index in `materials`
 
   // Index of the material at a point at rest (scene frame); empty: outside.
   [[nodiscard]] std::optional<std::size_t> material_at(const glm::dvec3& at_rest_m) const noexcept;
@@ -35,14 +35,14 @@ struct DrawnObject {
   std::string name;
   bool soft = false;
   polygon::TriangleMesh surface;  // scene frame, meters, at rest
-  // Name of the one material that the surface of a soft object shows; empty: none has a name, or it shows
-  // several.
+  // Name of the material that the surface of a soft object shows. Empty if the material has no name, or if
+  // the surface shows several.
   std::string material{};
-  // For a soft object with several visible materials, else both empty: their names, the largest area first,
-  // and for each vertex the index of the material beneath it.
+  // For a soft object with several visible materials: their names, the largest area first, and for each
+  // vertex the index of the material beneath it. Otherwise both are empty.
   std::vector<std::string> materials{};
   std::vector<std::uint8_t> vertex_material{};
-  DrawnInside inside{};  // only of a soft object with a material that its surface hides
+  DrawnInside inside{};  // only for a soft object whose surface hides a material
 };
 
 struct DrawnScene {
@@ -55,7 +55,8 @@ struct DrawnScene {
   std::vector<glm::dvec3> path_m{};  // places of the hand on its path, for the first view; may be empty
 };
 
-// Present place of a rigid object relative to its place at rest: a rotation about a point that moves along.
+// Present place of a rigid object relative to its place at rest: a rotation about a point that moves with the
+// object.
 struct RigidPlace {
   bool moved = false;
   glm::dvec3 about_m{0.0}, shift_m{0.0};  // scene frame
@@ -72,22 +73,22 @@ struct SoftPatch {
 };
 
 // Displacements of a soft object on nested boxes of nodes, the finest first. The first box that contains a
-// point defines its displacement, by interpolation.
+// point defines the point's displacement, by interpolation.
 struct SoftDent {
   struct Box {
-    std::array<int, 3> first{},
-        count{};   // position of node (0, 0, 0) (unit: spacing of the object); number of nodes
-    int step = 1;  // distance between nodes, in the same unit
-    // Does the object continue beyond the box on this side? If not, points beyond, by less than half a step,
-    // have the displacement of the last node.
+    // `first`: position of node (0, 0, 0) (unit: the object's spacing). `count`: nodes along each axis.
+    std::array<int, 3> first{}, count{};
+    int step = 1;  // distance between nodes (unit: the object's spacing)
+    // Does the object continue beyond the box on this side? If not, points less than half a step beyond have
+    // the displacement of the last node.
     std::array<bool, 3> open_low{}, open_high{};
     std::size_t stride = 0, plane = 0;
     std::array<std::vector<float>, 3> moved_m{};  // [axis of the object][k · plane + j · stride + i]
   };
-  bool used = false;       // by this object; outside all boxes it is at rest
-  glm::dmat3 to_scene{1};  // of the object's axes
+  bool used = false;       // the object uses boxes; outside all boxes it is at rest
+  glm::dmat3 to_scene{1};  // rotation from the object's axes to the scene's
   glm::dvec3 origin_m{0.0}, spacing_m{1.0};
-  std::size_t count = 0;  // of boxes in use; further ones keep their capacity
+  std::size_t count = 0;  // number of boxes in use; further boxes keep their capacity
   std::vector<Box> boxes{};
 
   // Displacement of a point at rest (scene frame, m).
@@ -101,13 +102,13 @@ struct Snapshot {
   std::uint64_t tick = 0;
   double t_s = 0.0;
   glm::dvec3 device_m{0.0}, proxy_m{0.0}, force_N{0.0};  // scene frame
-  std::vector<ObjectFeel> feel;                          // one an object
-  // [object] empty for a rigid one; for a soft one the displacement of each surface vertex (scene frame, m).
-  // Displacements, because a float position 1,000 km from the origin is off by centimetres.
+  std::vector<ObjectFeel> feel;                          // one per object
+  // [object] displacement of each surface vertex (scene frame, m); empty for rigid objects. Positions are not
+  // stored, because a float position 1,000 km from the origin is off by centimetres.
   MovedSurfaces soft_moved_m;
   // [object] filled for objects under asynchronous relaxation, whose thread supplies the rest.
   std::vector<SoftPatch> patches{};
-  // [object], or empty: for objects with contact on nested patches, instead of soft_moved_m.
+  // [object], or empty; for objects with contacts on nested patches, instead of soft_moved_m.
   std::vector<SoftDent> dents{};
   // [object], or empty: displacements within the touched soft objects, for a cut.
   std::vector<SoftDent> inside{};

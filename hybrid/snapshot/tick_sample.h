@@ -12,7 +12,7 @@ namespace hybrid {
 
 struct TickSample {
   double t_s = 0.0;
-  // Sizes of the force on the hand after its limits, and of its rigid and soft parts before them.
+  // Magnitude of the force on the hand after its limits, and of its rigid and soft parts before them.
   float total_N = 0.0F, rigid_N = 0.0F, soft_N = 0.0F;
   float tick_us = 0.0F;
   std::array<float, kStages> stage_us{};

@@ -9,11 +9,12 @@
 namespace hybrid {
 namespace {
 
-// Stiffness of tissue that stopped the tool, in stiffnesses of the tool: as good as rigid beside tissue that
-// gives way.
+// Stiffness of tissue that stopped the tool (unit: the tool's stiffness): as good as rigid, compared with
+// tissue that gives way.
 constexpr double kJammedStiffness = 1e3;
-// Stiffness of any object near the tool, in stiffnesses of the tool: less than that of a pressed voxel. It
-// makes the sum of stiffnesses regular, and leaves no part of the force without an object.
+// Stiffness added for any object near the tool (unit: the tool's stiffness). It is less than that of a
+// pressed voxel. It makes the sum of stiffnesses regular, so that every part of the force belongs to an
+// object.
 constexpr double kLeastStiffness = 1e-6;
 
 }  // namespace

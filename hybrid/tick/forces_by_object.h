@@ -12,9 +12,9 @@ namespace hybrid {
 // state.rigid_force_N. The parts of the soft objects sum up to `soft_N`, the force that all of them exert on
 // the proxy (scene frame).
 //
-// A reaction knows the links of pressed voxels only. The difference to `soft_N` is carried by limits, anchors
-// and voxels that jam the tool. The objects near the tool share it as springs in parallel. Along the normals
-// of planes that stopped the tool an object is as good as rigid.
+// A reaction contains only the forces of the pressed voxels' links. The rest of `soft_N` is carried by
+// limits, by anchors and by voxels that jam the tool. The objects near the tool share this rest as springs in
+// parallel. An object is as good as rigid along the normals of its planes that stopped the tool.
 void split_by_object(const World& world, WorldState& state, const glm::dvec3& soft_N) noexcept;
 
 }  // namespace hybrid

@@ -16,14 +16,14 @@ namespace hybrid {
 namespace {
 
 struct ContactSettings {
-  int passes = 3;           // proxy and tissue answer each other at most this often in a tick
+  int passes = 3;           // most passes in a tick; in each the proxy moves and then the tissue
   int sweeps = 1;           // relaxations of the contact's neighbourhood in each pass
   double soft_step = 0.25;  // longest step of the proxy against tissue in one pass (unit: the tool's reach)
-  double arrived = 1e-2;    // a second pass that moves the proxy less is the last (unit: the tool's radius)
+  double arrived = 1e-2;    // a later pass that moves the proxy less is the last (unit: the tool's radius)
   double still = 1e-5;      // a pass that moves the proxy less gives no secant (unit: the tool's radius)
-  // Learnt stiffness. kept: share kept from pass to pass. least_overshoot: smaller ones are ignored (unit:
-  // the pull before the step). most_overshoot: larger ones are clamped. most_learnt: bound of the result
-  // (unit: the model's stiffness).
+  // Settings of the learnt stiffness. kept: share kept from pass to pass. least_overshoot: smaller ones are
+  // ignored (unit: the pull before the step). most_overshoot: larger ones are clamped. most_learnt: bound of
+  // the result (unit: the model's stiffness).
   double kept = 0.9, least_overshoot = 0.25, most_overshoot = 3.0, most_learnt = 50.0;
   double probe = 0.005;  // how far the proxy probes jammed tissue once a tick (unit: the tool's radius)
   // Search radii for rigid planes when tissue stops the proxy (unit: the tool's radius). The second radius is
@@ -42,8 +42,9 @@ glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm:
 // The tissue's model is the stiffness of the voxels that are pressed now. The true stiffness is larger when a
 // chain tightens as the proxy moves, or when the tool meets further voxels. Steps by the model alone could
 // then alternate between two places without end. If a step overshoots (the pull changes sign), the secant
-// stiffness that would have landed right is learnt. It decays over the next passes. Steps that do not
-// overshoot teach nothing, because tissue that relaxes meanwhile looks arbitrarily stiff on a short step.
+// stiffness is learnt: with it the step would have ended at zero pull. It decays over the next passes.
+// Nothing is learnt from other steps: over a short step, tissue that relaxes meanwhile looks arbitrarily
+// stiff.
 void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
                      const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
   state.learnt_stiffness_N_per_m *= kSettings.kept;
@@ -127,7 +128,7 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   state.scratch.stops.clear();
   glm::dmat3 model(k);
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
-  // The learnt stiffness applies only in contact; free, the proxy goes to the device at once.
+  // The learnt stiffness applies only in contact. A free proxy goes to the device at once.
   const bool pressed = model != glm::dmat3(k);
   const glm::dmat3 metric = pressed ? model + glm::dmat3(state.learnt_stiffness_N_per_m) : model;
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
@@ -150,7 +151,7 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   return glm::length(delta);
 }
 
-// How deep a tool at `point` is in the last `count` planes, at most (m).
+// Greatest depth (m) of a tool at `point` in the last `count` planes.
 double deepest(const WorldState& state, std::size_t count, const glm::dvec3& point) noexcept {
   double most = 0.0;
   for (std::size_t i = state.scratch.planes.size() - count; i < state.scratch.planes.size(); ++i)
@@ -207,7 +208,8 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
       minimise_outside_rigid(world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)), [&] {
         bounds = tool_bounds(world, state, state.proxy_m, false, kSettings.soft_step, state.scratch.planes);
       });
-  // If no exit is found, return to the start of the tick, unless the tool was deeper there.
+  // Notes the planes that stop the tool. Then moves the tool to the exit, or else back to the start of the
+  // tick, unless it was deeper there.
   for (std::size_t i = least.rigid; i < state.scratch.planes.size(); ++i) {
     if (state.scratch.planes[i].offset > glm::dot(state.scratch.planes[i].normal, state.proxy_m))
       add_stop(state, state.scratch.planes[i]);

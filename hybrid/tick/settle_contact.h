@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The contact stage of the tick: proxy, rigid planes and tissue, in passes, because each depends on the
-// others. One proxy minimises the coupling's energy plus that of the tissue, subject to the rigid planes. The
+// The contact stage of the tick. Proxy, rigid planes and tissue depend on one another, so they are solved in
+// passes. One proxy minimises the coupling's energy plus that of the tissue, subject to the rigid planes. The
 // hand feels the coupling alone, so that no force adds energy over a closed path.
 #pragma once
 

@@ -24,12 +24,13 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFarthestDevice_m = 1e12;   // a thousand times the largest scene
+constexpr double kFarthestDevice_m = 1e12;   // m; a thousand times the largest scene
 constexpr double kLongestTick_s = 86'400.0;  // a day: times stay finite however many ticks are added
 
-// CPU time of each stage, so that pre-emption does not count. A read of the thread's CPU time is a system
-// call and takes up to 2 µs; the wall clock takes 0.03 µs. So a stage is timed by the wall clock, and again
-// by CPU time if that was long enough to hide a pre-emption. The tick is the sum of its stages.
+// Measures the CPU time of each stage, so that pre-emption does not count. A read of the thread's CPU time is
+// a system call and takes up to 2 µs; the wall clock takes 0.03 µs. So a stage is timed by the wall clock
+// first. If its wall time is long enough to hide a pre-emption, CPU time is read and replaces it. The tick is
+// the sum of its stages.
 class StageClock {
  public:
   explicit StageClock(TickResult& result)
@@ -49,7 +50,7 @@ class StageClock {
     }
     result_.stage_us[static_cast<std::size_t>(stage)] += static_cast<float>(us);
   }
-  // Excludes time that a separate thread would have spent from the finished stage.
+  // Subtracts from a finished stage the time that a separate thread would have spent.
   void leave_out(Stage stage, double us) noexcept {
     float& of_stage = result_.stage_us[static_cast<std::size_t>(stage)];
     of_stage = std::max(0.0F, of_stage - static_cast<float>(us));
@@ -63,12 +64,12 @@ class StageClock {
   static constexpr double kShort_us = 10.0;  // longest wall time that is taken as CPU time
 
   TickResult& result_;
-  double cpu_us_;          // CPU time at its last read
-  double short_us_ = 0.0;  // wall time of the stages since then
+  double cpu_us_;          // thread's CPU time when it was last read
+  double short_us_ = 0.0;  // wall time of the stages since that read
   Clock::time_point last_;
 };
 
-// A position that is further away than the bound is as invalid as NaN.
+// Is the position valid? One beyond kFarthestDevice_m is as invalid as NaN.
 bool is_place(const glm::dvec3& v) noexcept {
   return polygon::is_finite(v) &&
          std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= kFarthestDevice_m;
@@ -93,7 +94,8 @@ double check_time(double dt_s) noexcept {
 // objects on nested patches for contact.
 Neighbourhood broad_phase(const World& world, WorldState& state, const glm::dvec3& device) noexcept {
   Neighbourhood around{.range_m = contact_range_m(world, state)};
-  // The map has an object on pressed patches only at rest, so it cannot decide that the way is free.
+  // The map holds an object that is pressed on nested patches in its rest state, so the map cannot decide
+  // that the way is free.
   around.free = !contact_on_patches(state) &&
                 advance_through_free_space(world, state, device, soft_reach(world, state));
   if (around.free) state.active_count = 0;
@@ -119,7 +121,7 @@ void relax_tissue(const World& world, WorldState& state, StageClock& clock) noex
 // The last operations on the force, in the order that device/README.md justifies.
 glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& force_N,
                      const device::DeviceState& input, double dt_s) noexcept {
-  // The gate gets the position in use: an invalid input was replaced by the last valid one.
+  // limit_force() gets the position in use: an invalid input was replaced by the last valid one.
   const device::DeviceState tool{.position_m = state.device_m, .fault = input.fault};
   const std::uint64_t bad = state.limit.nonfinite;
   device::ForceLimits limits = world.limits;
@@ -130,7 +132,7 @@ glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& fo
   return device::keep_passive(*world.passivity, state.passive, limited, state.device_m, dt_s);
 }
 
-// The hand feels the coupling, damping and texture alone; the parts and contacts are for the record.
+// The hand feels the coupling, damping and texture alone; the parts and contacts are only recorded.
 void publish_force(const World& world, WorldState& state, const Sweep& sweep,
                    const device::DeviceState& input, double dt_s, TickResult& result) noexcept {
   const glm::dvec3 coupling = coupling_N_per_m(world, state) * (state.proxy_m - result.device_m);
@@ -167,7 +169,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   clock.done(Stage::contact);
 
   // Soft objects that meet may push one another back into the tool's way, so the tool gives way after them.
-  // Tissue that cannot meet other tissue relaxes after the tool.
+  // If no soft objects can meet, tissue relaxes after the tool gave way.
   const bool may_meet = !world.soft_pairs.empty();
   if (may_meet) {
     relax_tissue(world, state, clock);
@@ -178,7 +180,8 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   clock.done(Stage::arbitration);
   if (!may_meet) relax_tissue(world, state, clock);
 
-  // Last of all that moves tissue, so that no body overlaps tissue at the end of the tick.
+  // This is the last step that moves bodies or tissue, so that no body overlaps tissue at the end of the
+  // tick.
   push_bodies_out_of_tissue(world, state, dt_s);
   flag_squeezed_bodies(world, state);
   clock.done(Stage::arbitration);

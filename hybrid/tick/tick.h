@@ -28,7 +28,7 @@ struct TickResult {
   glm::dvec3 device_m{0.0};  // scene frame, as used: the last valid input
   glm::dvec3 proxy_m{0.0};
   glm::dvec3 force_N{0.0};  // on the hand, after the limits
-  // Its parts before the limits: rigid_N + soft_N = K (proxy − device) plus damping and texture.
+  // Parts of the force before the limits: rigid_N + soft_N = K (proxy − device) plus damping and texture.
   glm::dvec3 rigid_N{0.0}, soft_N{0.0};
   // A bit per object, rigid ones first; all objects from the 32nd on share the last bit.
   std::uint32_t contacts = 0;
@@ -36,10 +36,10 @@ struct TickResult {
   double tick_us = 0.0;                   // the sum of the stages
 };
 
-// One tick of dt_s. A pure function of (world, state, input, dt_s), measured times excepted: the same inputs
-// give the same bits. Never allocates, locks, throws or does I/O; every loop is bounded. Any input is
-// accepted. A position that is not finite or beyond 1e12 m is replaced by the last valid one
-// (fault_nonfinite_input). A negative or non-finite dt_s is treated as 0, in which no time passes; a dt_s
+// One tick of `given_dt_s`. Except for measured times, it is a pure function of world, state, input and
+// given_dt_s: the same inputs give the same bits. Never allocates, locks, throws or does I/O; every loop is
+// bounded. Any input is accepted. A position that is not finite or beyond 1e12 m is replaced by the last
+// valid one (fault_nonfinite_input). A negative or non-finite given_dt_s is treated as 0: no time passes. One
 // longer than a day is shortened to a day.
 TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
                        double given_dt_s) noexcept;

@@ -15,10 +15,10 @@
 namespace hybrid {
 namespace {
 
-constexpr double kEdgeSteps = 40.0;  // points along an edge as long as the shape's diagonal
-constexpr double kAlongAxis = 0.5;   // of a capsule's radius: distance between points
+constexpr double kEdgeSteps = 40.0;  // number of points on an edge as long as the shape's diagonal
+constexpr double kAlongAxis = 0.5;   // distance of points on a capsule's axis (unit: its radius)
 constexpr double kSharp = 0.03;      // sharpness beyond which an edge gets points
-constexpr double kFlat = 1e-6;       // summed sharpness of its edges up to which a vertex gets no point
+constexpr double kFlat = 1e-6;       // a vertex gets a point if the sharpness of its edges adds up to more
 
 struct Weighed {
   glm::dvec3 at{0.0};
@@ -29,7 +29,7 @@ struct Weighed {
 
 struct Edge {
   std::uint32_t low, high, triangle;
-  double sharpness = 0.0;  // 1 − cosine between its two faces; 2 if there are not two
+  double sharpness = 0.0;  // 1 − cosine of the angle between its faces' normals; 2 if it has not two faces
   bool operator<(const Edge& other) const {
     return std::tie(low, high, triangle) < std::tie(other.low, other.high, other.triangle);
   }
@@ -112,7 +112,7 @@ class SharpPlaces {
   double step_m_ = 0.0;
 };
 
-// Keeps the sharpest point of each cell; cells grow until few enough points are left.
+// Keeps the sharpest point of each cell of a grid. Cells grow until at most kMostSurfacePoints are left.
 std::vector<SurfacePoint> thinned(std::vector<Weighed> points, double cell_m) {
   using Cell = std::tuple<double, double, double>;
   const bool whole = points.size() <= kMostSurfacePoints;
@@ -170,7 +170,8 @@ std::vector<SurfacePoint> surface_points(const RigidSource& source, const polygo
     }
     return result;
   }
-  // The drawn meshes of boxes and sheets have many triangles, whose edges are cut into pieces.
+  // Drawn meshes of boxes and sheets have many triangles, which cut the object's edges into pieces. Undivided
+  // meshes are used instead.
   if (const auto* box = std::get_if<BoxPrimitive>(&source))
     return points_of(polygon::make_box_mesh(0.5 * box->size_m, 1));
   if (const auto* sheet = std::get_if<PlanePrimitive>(&source))

@@ -9,10 +9,11 @@
 namespace hybrid {
 namespace {
 
-// A factor on Young's modulus: the stiffest tissue of the table of tissues is 1,000 times the softest.
+// Factor on Young's modulus. In the table of tissues the stiffest is 700 times as stiff as the softest.
 constexpr AllowedRange kFactorRange{1e-3, 1e3};
-// Sliders: from a tenth of the scene's value to ten times it. Friction above 1.5 and damping above 20 N s/m
-// are no longer felt as such.
+// Ranges of sliders. Most go from a tenth of the scene's value to ten times that value. Friction above 1.5
+// and damping above 20 N s/m are no longer felt as such, so their sliders end there unless the scene's value
+// is larger.
 constexpr double kUsualFactor = 10.0;
 constexpr AllowedRange kUsualFriction{0.0, 1.5}, kUsualDamping_N_s_per_m{0.0, 20.0};
 
@@ -161,7 +162,7 @@ bool apply_edit(const World& world, WorldState& state, const Edit& edit) noexcep
     edited.max_force_N = edit.value;
   } else if (edit.quantity == EditedQuantity::tissue_factor) {
     const std::size_t soft = edit.object - world.rigid.size();
-    // The reaction of the last tick is that of the tissue before the edit.
+    // The reaction of the last tick belongs to the tissue before the edit, so it is scaled too.
     const double change = edit.value / edited.tissue_factor[soft];
     state.reactions[soft].force_N *= change;
     state.reactions[soft].stiffness_N_per_m *= change;

@@ -19,12 +19,12 @@ namespace hybrid {
 // The order is part of the recording's format: append only.
 enum class EditedQuantity : std::uint32_t {
   coupling_stiffness,  // N/m, of the tool
-  max_force,           // N; at most that of the scene, which is at most the device's
-  static_friction,     // of a rigid object; lowers the dynamic one to its own value
-  dynamic_friction,    // of a rigid object; raises the static one to its own value
+  max_force,           // N; at most the scene's value, which is at most the device's
+  static_friction,     // of a rigid object; a larger dynamic_friction is lowered to it
+  dynamic_friction,    // of a rigid object; a smaller static_friction is raised to it
   damping,             // N s/m, of a rigid object
   texture_height,      // m, of a rigid object with a texture
-  tissue_factor,       // of a soft object: factor on Young's modulus towards the tool
+  tissue_factor,       // of a soft object: factor on Young's modulus as the tool feels it
 };
 inline constexpr std::size_t kEditedQuantities = 7;
 
@@ -32,7 +32,7 @@ struct Edit {
   static constexpr std::uint32_t kTool = 0xFFFFFFFFU;
 
   std::uint64_t tick = 0;        // ticks since the session began
-  std::uint32_t object = kTool;  // rigid ones first, then soft ones
+  std::uint32_t object = kTool;  // index: rigid objects first, then soft ones; kTool: the tool
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
   double value = 0.0;  // SI
   bool operator==(const Edit&) const = default;
@@ -43,14 +43,15 @@ static_assert(sizeof(Edit) == 24 && std::is_trivially_copyable_v<Edit>, "a recor
 struct EditableValue {
   std::uint32_t object = Edit::kTool;
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
-  AllowedRange range{};      // the scene's own
-  AllowedRange usual{};      // of a slider, within the range
+  AllowedRange range{};      // allowed values
+  AllowedRange usual{};      // range of a slider, within `range`
   double in_scene = 0.0;     // the scene's value
   bool logarithmic = false;  // scale of a slider
 };
 
-// All values that may be edited: of the tool, then object by object. A soft object that meets other soft
-// objects or free bodies, or that yields, has none: their forces would have to scale as well.
+// All values that may be edited: of the tool, then object by object. A soft object has none if it may meet
+// another soft object, if the scene has a free body, or if its tissue is plastic: forces other than the
+// reaction on the tool would have to scale as well.
 [[nodiscard]] std::vector<EditableValue> editable_values(const World& world, const WorldState& state);
 
 // Range of a value; empty: the object has no such value.
@@ -63,14 +64,14 @@ struct EditableValue {
 // Applies an edit between two ticks. False, and nothing changes, if the object has no such value or the value
 // is out of range. Allocates nothing, never throws.
 bool apply_edit(const World& world, WorldState& state, const Edit& edit) noexcept;
-// Applies the edits of this tick; `next` is the index of the first edit that is still to come.
+// Applies the edits of `tick` and of earlier ticks. `next`: index of the first edit that was not applied yet.
 void apply_edits_of_tick(const World& world, WorldState& state, std::span<const Edit> edits,
                          std::uint64_t tick, std::size_t& next) noexcept;
 
-// "stiffness", "friction static", …, as scripts name them, and their units as people write them.
+// "stiffness", "static-friction", …, as scripts name the quantities, and their units as people write them.
 [[nodiscard]] std::string_view name_of(EditedQuantity quantity) noexcept;
 [[nodiscard]] std::string_view unit_of(EditedQuantity quantity) noexcept;
-// SI value of one unit as written.
+// SI value of one such unit.
 [[nodiscard]] double si_of_unit(EditedQuantity quantity) noexcept;
 [[nodiscard]] std::optional<EditedQuantity> quantity_named(std::string_view name) noexcept;
 

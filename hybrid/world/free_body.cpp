@@ -14,8 +14,8 @@ namespace hybrid {
 namespace {
 
 constexpr int kMaxNewton = 12;          // Newton steps of the midpoint rule
-constexpr double kLongestStep_s = 1.0;  // a longer pause is not made up for
-constexpr double kMostTurn = 1.0;       // rad a step: beyond it the midpoint rule has more than one solution
+constexpr double kLongestStep_s = 1.0;  // longer steps are shortened to this
+constexpr double kMostTurn = 1.0;       // rad per step; beyond it the midpoint rule is ambiguous
 
 glm::dmat3 cross_matrix(const glm::dvec3& v) noexcept {
   return {0.0, v.z, -v.y, -v.z, 0.0, v.x, v.y, -v.x, 0.0};  // columns
@@ -139,7 +139,7 @@ bool step_free_body(const FreeBody& body, FreeBodyState& state, std::span<const 
   std::array<double, 36> matrix{};
   std::array<double, 18> twists{};
   std::array<std::uint32_t, 1> first{};
-  std::array<ContactOnLine, kMaxOneSided> ways;  // NOLINT(*-member-init): 100 kB that few steps need
+  std::array<ContactOnLine, kMaxOneSided> ways;  // NOLINT(*-member-init): 256 KiB that few steps need
   SteppedBody stepped{&body, state};
   step({&stepped, 1}, contacts, {matrix, twists, first, ways}, dt_s);
   state = stepped.state;

@@ -32,7 +32,7 @@ struct FreeBody {  // constant
 };
 
 struct FreeBodyState {
-  glm::dvec3 centre_m{0.0};                 // of mass, scene frame
+  glm::dvec3 centre_m{0.0};                 // centre of mass, scene frame
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};  // body to scene, unit
   glm::dvec3 velocity_m_per_s{0.0};         // of the centre of mass, scene frame
   glm::dvec3 spin_rad_per_s{0.0};           // scene frame
@@ -44,10 +44,10 @@ FreeBody without_external_loads(const FreeBody& body) noexcept;
 FreeBodyState state_at(const FreeBody& body, const Pose& pose);
 Pose pose_of(const FreeBody& body, const FreeBodyState& state) noexcept;
 
-// A contact force on the body: `force_N` now, along `normal` (unit, the direction in which it pushes the
-// body), less `stiffness_N_per_m` (>= 0) for each meter that `point_m` moves along `normal`. A damper b adds
-// b/dt to the stiffness (and b · approach speed to the force). If `other` is a free body it takes the
-// opposite force. `friction` is Coulomb's coefficient.
+// A contact force on the body along `normal` (unit; the direction in which the contact pushes the body). It
+// is `force_N` at the start of the step, and falls by `stiffness_N_per_m` (>= 0) for each meter that
+// `point_m` moves along `normal`. A damper b (N s/m) adds b/dt to the stiffness and b · approach speed to the
+// force. If `other` is a free body, it takes the opposite force. `friction` is Coulomb's coefficient.
 struct BodyContact {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
@@ -59,21 +59,22 @@ struct BodyContact {
   glm::dvec3 carried_m_per_s{0.0};  // prescribed velocity of the other side's surface
 };
 
-// Contacts beyond this number are bilateral: they are never released within the step. Each voxel of tissue is
-// a contact of its own, hundreds in all, so that each can be released by itself.
+// Contacts beyond this number are bilateral: they are never released within the step. There may be hundreds
+// of contacts: each voxel of tissue is a contact of its own, so that it can be released by itself.
 inline constexpr std::size_t kMaxOneSided = 4096;
 
 // One of the bodies that step together.
 struct SteppedBody {
   const FreeBody* body = nullptr;
   FreeBodyState state;   // before the step, then after it
-  bool stopped = false;  // its result would not have been finite: it stands still where it was
+  bool stopped = false;  // the result would not have been finite: the body stands still where it was
 };
 
-// Force of a contact along the line between two velocity solutions.
+// A contact on the line from one velocity solution to the next. Its force is `from_N` at the start of the
+// line and `from_N + more_N` at the end. Its slip is `slip` and `slip + more_slip`.
 struct ContactOnLine {
   double from_N, more_N;
-  double moved_m;  // how much more its point moves
+  double moved_m;  // difference between both solutions in the point's motion along the normal
   double friction_N;
   std::array<double, 2> slip, more_slip;  // m/s
 };
@@ -88,17 +89,17 @@ class BodySystem {
   friend void step_free_bodies(std::span<SteppedBody> bodies, std::span<const BodyContact> contacts,
                                BodySystem& system, double dt_s) noexcept;
   std::vector<double> matrix_, twists_;
-  std::vector<std::uint32_t> first_;  // [body] first body that it has a contact with, itself included
+  std::vector<std::uint32_t> first_;  // [body] lowest index among the body and those in contact with it
   std::vector<ContactOnLine> lines_;
 };
 
-// Advances the bodies by dt_s, at most as many as there is room for. Bounded, allocates nothing. A body
-// without contact to others gets the result that it would get alone.
+// Advances the bodies by dt_s, but only the first system.most_bodies() of them. Bounded, allocates nothing. A
+// body without contact to others gets the result that it would get alone.
 void step_free_bodies(std::span<SteppedBody> bodies, std::span<const BodyContact> contacts,
                       BodySystem& system, double dt_s) noexcept;
 
-// The same for one body. Pure, bounded, allocates nothing. False if the result would not be finite (an input
-// was not): the body then stands still where it was.
+// Does the same for one body. Pure, bounded, allocates nothing. False if the result would not be finite
+// because an input was not. The body then stands still where it was.
 bool step_free_body(const FreeBody& body, FreeBodyState& state, std::span<const BodyContact> contacts,
                     double dt_s) noexcept;
 

@@ -12,19 +12,20 @@ namespace hybrid {
 namespace {
 
 constexpr int kMaxSolves = 16;          // Newton steps without friction
-constexpr int kMaxFrictionSolves = 16;  // … with friction
+constexpr int kMaxFrictionSolves = 16;  // Newton steps with friction
 constexpr double kStickSpeed = 1e-5;    // m/s: regularises Coulomb's law; slower sliding counts as sticking
 constexpr double kSlipTolerance = 0.01, kForceTolerance = 0.1;  // relative tolerances of slip and pressure
 constexpr int kHalvings = 40;
-constexpr double kFlatEnough = 0.1;  // of the slope at the beginning of the line search
+constexpr double kFlatEnough = 0.1;  // the line search ends where the slope is this fraction of the first
 
 double dot(const Twist& a, const Twist& b) noexcept {
   return glm::dot(a.linear, b.linear) + glm::dot(a.angular, b.angular);
 }
 
-// Symmetric positive definite matrix, six rows a body, solved by Cholesky in place. Each body's rows begin at
-// the first body that it has a contact with, so that bodies that do not touch cost no more than each alone.
-// The factorisation does not depend on the scaling of rows and columns, so different units do no harm.
+// Symmetric positive definite matrix with six rows per body, solved by Cholesky in place. The rows of a body
+// begin at the column of the first body that it touches. So bodies that do not touch cost no more than each
+// body alone. The factorisation does not depend on the scaling of rows and columns, so different units do no
+// harm.
 class BlockCholesky {
  public:
   BlockCholesky(std::span<double> matrix, std::span<const std::uint32_t> first) : a_(matrix), first_(first) {
@@ -38,7 +39,7 @@ class BlockCholesky {
         at(from + i, from + j) += m[static_cast<int>(j)][static_cast<int>(i)];
     }
   }
-  // Adds k times the outer product of a contact's levers on two bodies (`body` no earlier than `other`).
+  // Adds k times the outer product of a contact's levers on two bodies (`body` >= `other`).
   void add_outer(std::size_t body, const Twist& j, std::size_t other, const Twist& i, double k) noexcept {
     for (std::size_t r = 0; r < 6; ++r) {
       const std::size_t end = body == other ? r + 1 : 6;
@@ -79,13 +80,13 @@ class BlockCholesky {
   std::span<const std::uint32_t> first_;
 };
 
-// Lever of a contact on a body: its point moves along `way` by j · twist.
+// Lever j of a contact on a body: the speed of the contact's point along `way` is j · twist.
 Twist lever(const BodyContact& contact, const glm::dvec3& way, const FreeBodyState& state) noexcept {
   return {way, glm::cross(contact.point_m - state.centre_m, way)};
 }
 
-// The convex problem of one step: bodies, their velocities at the end of the step, and contacts that depend
-// on these.
+// The convex problem of one step. Its unknowns are the bodies' velocities at the end of the step, on which
+// the contact forces depend.
 class ContactSolver {
  public:
   ContactSolver(std::span<const SteppedBody> bodies, std::span<const BodyContact> contacts,
@@ -110,10 +111,11 @@ class ContactSolver {
         std::any_of(contacts.begin(), contacts.end(), [](const BodyContact& c) { return c.friction > 0.0; });
   }
 
-  // False if the velocities would not be finite. The energy is convex in the velocities: a quadratic,
-  // unilateral contacts, and dissipation by friction. From each solution the line search goes towards the
-  // next as far as the energy falls (a semi-smooth Newton method, which cannot cycle). If the iterations run
-  // out, contacts may pull a little. Friction bounds use the normal forces of the previous solution.
+  // False if the velocities would not be finite. The energy is convex in the velocities: the sum of a
+  // quadratic, the energy of unilateral contacts, and dissipation by friction. The method is a semi-smooth
+  // Newton method. Each step is shortened by a line search to where the energy no longer falls, so the method
+  // cannot cycle. If the iterations run out, contacts may pull a little. Friction bounds use the normal
+  // forces of the previous solution.
   bool solve() noexcept {
     std::fill(x_.begin(), x_.end(), 0.0);
     for (std::size_t c = 0; c < one_sided_; ++c) active_[c] = !(contacts_[c].force_N < 0.0);
@@ -127,8 +129,8 @@ class ContactSolver {
       update_active_set();
       if (!has_friction_ || !(confirmed || friction_on)) continue;
       std::copy(x_.begin(), x_.end(), friction_basis_.begin());
-      // Starts from the velocities before the step: resting contacts stick from the beginning, and sliding
-      // ones have their direction.
+      // With friction, the iteration starts from the velocities before the step. So resting contacts stick
+      // from the beginning, and sliding contacts have the right direction.
       if (!friction_on) {
         for (std::uint32_t b = 0; b < bodies_.size(); ++b) set_twist(x_, b, twist_before(b));
       }
@@ -173,18 +175,19 @@ class ContactSolver {
     return {speed(c, ways[0], all) - glm::dot(ways[0], c.carried_m_per_s),
             speed(c, ways[1], all) - glm::dot(ways[1], c.carried_m_per_s)};
   }
-  // Bound of the contact's friction (N). Its dissipated power is this bound times sqrt(slip² + kSticks²).
+  // Bound of the contact's friction (N). The contact dissipates this bound times sqrt(slip² + kStickSpeed²)
+  // (W).
   [[nodiscard]] double friction_N(const BodyContact& c) const noexcept {
     return c.friction > 0.0 && !stopped(c) ? c.friction * std::max(0.0, pressed_N(c, friction_basis_)) : 0.0;
   }
-  // Adds its slope and curvature at the slip of before_.
+  // Adds the slope and curvature of the friction's dissipation at the slip of before_.
   void add_friction(BlockCholesky& system, const BodyContact& c) noexcept {
     const double most_N = friction_N(c);
     if (!(most_N > 0.0)) return;
     const auto [u, v] = slip(c, before_);
     const double s = std::sqrt(u * u + v * v + kStickSpeed * kStickSpeed), k = most_N / s;
     const double q = std::hypot(u, v), flat = k * (kStickSpeed * kStickSpeed) / (s * s);
-    // Its principal axes are the direction of sliding and the one across.
+    // The principal axes of the curvature are the direction of sliding and the direction across it.
     const std::array<glm::dvec3, 2> ways = along(c);
     const glm::dvec3 on = q > 0.0 ? (u * ways[0] + v * ways[1]) / q : ways[0],
                      across = q > 0.0 ? (u * ways[1] - v * ways[0]) / q : ways[1];
@@ -248,8 +251,8 @@ class ContactSolver {
   void scale_step(double share) noexcept {
     for (std::size_t i = 0; i < x_.size(); ++i) x_[i] = before_[i] + share * (x_[i] - before_[i]);
   }
-  // Line search: the fraction of the way from `before_` to `x_` up to which the energy falls. The contacts'
-  // part of the slope is piecewise linear and grows monotonically.
+  // Line search: the fraction of the way from `before_` to `x_` up to which the energy falls. The slope grows
+  // monotonically, because the energy is convex. The part of the normal forces is piecewise linear.
   [[nodiscard]] double line_search(bool with_friction) noexcept {
     double slope = 0.0, curvature = 0.0;  // without the contacts, at before_
     for (std::uint32_t b = 0; b < bodies_.size(); ++b) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The velocities of free bodies at the end of a step, with implicit contact forces and friction: one convex
-// problem for all bodies (equation in free_body.h).
+// Solves for the velocities of free bodies at the end of a step, with implicit contact forces and friction.
+// All bodies form one convex problem (equation in free_body.h).
 #pragma once
 
 #include <array>
@@ -21,10 +21,10 @@ struct Twist {
   }
 };
 
-struct SolveScratch {                // of n bodies
-  std::span<double> matrix, twists;  // 36 n², 18 n
-  std::span<std::uint32_t> first;    // n
-  std::span<ContactOnLine> ways;     // kMaxOneSided
+struct SolveScratch {                // buffers for n bodies
+  std::span<double> matrix, twists;  // lengths 36 n² and 18 n
+  std::span<std::uint32_t> first;    // length n
+  std::span<ContactOnLine> ways;     // length kMaxOneSided
 };
 
 // Writes each body's twist after a step of dt (> 0), six numbers a body, to the beginning of scratch.twists.

@@ -16,7 +16,7 @@
 namespace hybrid {
 namespace {
 
-// Mass properties at density 1, if the shape has a volume.
+// Mass properties at a density of 1 kg/m³, if the shape has a volume.
 struct EvenlyFilled {
   const polygon::TriangleMesh& shape;
   bool closed;
@@ -64,7 +64,8 @@ FreeBody free_body_of(const RigidDescription& description, const FreeMotion& mot
     body.mass.inertia_kg_m2 = {i.x, 0.0, 0.0, 0.0, i.y, 0.0, 0.0, 0.0, i.z};
   }
   if (motion.centre_m) {
-    // Steiner: given moments hold about the given centre; computed moments are moved there.
+    // Moments of inertia from the scene are about the given centre. Computed moments are moved there
+    // (Steiner's theorem).
     if (!motion.inertia_kg_m2) {
       const glm::dvec3 d = *motion.centre_m - body.mass.centre_m;
       body.mass.inertia_kg_m2 += body.mass.mass_kg * (glm::dmat3(glm::dot(d, d)) - glm::outerProduct(d, d));

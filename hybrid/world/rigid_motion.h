@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a rigid object moves: the constant half, made once from the scene. A path is a pure function of
+// The constant part of a rigid object's motion, made once from the scene. A path is a pure function of
 // simulated time. A free body's state (FreeBodyState) belongs to the session's state.
 #pragma once
 
@@ -28,8 +28,8 @@ class RigidMotion {
   [[nodiscard]] bool moves() const noexcept { return kind_ != Kind::fixed; }
   [[nodiscard]] const Pose& start() const noexcept { return start_; }
 
-  // The pose at simulated time `t_s`: exactly start() at 0 and for every motion but a path. Pure, allocates
-  // nothing.
+  // The pose at simulated time `t_s` (s). It is exactly start() at time 0, and always if the motion is not a
+  // path. Pure, allocates nothing.
   [[nodiscard]] Pose pose_at(double t_s) const noexcept;
   // Time until the path ends; infinite for a spin, 0 without a path.
   [[nodiscard]] double duration_s() const noexcept;
@@ -46,8 +46,8 @@ class RigidMotion {
   std::shared_ptr<const device::Path> path_;
   std::optional<SpinDescription> spin_;
   FreeBody free_;
-  glm::dvec3 middle_in_body_{0.0};  // of the object's box
-  double lever_m_ = 0.0;            // distance of the object's farthest point from there
+  glm::dvec3 middle_in_body_{0.0};  // middle of the object's box
+  double lever_m_ = 0.0;            // distance of the object's farthest point from middle_in_body_
 };
 
 }  // namespace hybrid

@@ -35,14 +35,14 @@ struct OwnContacts {
 struct FreeBodyStep {
   std::vector<SteppedBody> stepped;
   std::vector<OwnContacts> own;          // [stepped]
-  std::vector<std::uint32_t> object;     // [stepped] the rigid object
+  std::vector<std::uint32_t> object;     // [stepped] index of its rigid object
   std::vector<std::uint32_t> member;     // [rigid] index into `stepped`
   std::vector<BodyFrame> before, after;  // [rigid]
   std::vector<Pose> next;                // [rigid]
   std::vector<double> moves_m;           // [rigid]
   // [stepped] copy without gravity and drag, so that contacts alone act on it.
   std::vector<FreeBody> contacts_only;
-  std::vector<SteppedBody> still;  // [stepped] the same, with zero velocity
+  std::vector<SteppedBody> still;  // [stepped] body of contacts_only, with zero velocity
   BodySystem system;
 };
 
@@ -67,13 +67,13 @@ struct TickScratch {
   std::vector<std::uint32_t> map_hits;               // entries that the last look-up in the map returned
   std::vector<std::vector<voxel::VoxelId>> touched;  // [soft] surface voxels near the tool
   std::vector<polygon::ContactPlane> stops;  // planes of soft objects that stopped the tool in this tick
-  std::vector<glm::dmat3> soft_stiffness;    // [soft] on the tool (N/m), of split_by_object()
+  std::vector<glm::dmat3> soft_stiffness;    // [soft] stiffness on the tool (N/m); used by split_by_object()
 
   // ---- bodies that move ----
   std::vector<DueQuery> due;
   std::vector<std::uint32_t> in_the_way;            // surface voxels inside a body
   std::vector<BodyContact> body_contacts;           // all contacts of free bodies
-  FreeBodyStep free_bodies;                         // the free bodies of these contacts
+  FreeBodyStep free_bodies;                         // free bodies that they act on
   std::vector<std::uint32_t> body_surface_numbers;  // surface voxels of one object that press on a free body
   std::vector<voxel::VoxelId> body_voxels;          // their voxels
   std::vector<voxel::ContactLoad> body_loads;       // their loads

@@ -55,7 +55,7 @@ struct RigidObject {
 struct SoftBody {  // the constant half of a soft object; WorldState::soft is the other one
   std::string name;
   voxel::BodyPose pose;                               // volume frame to scene
-  std::uint32_t first_number = 0;                     // of its surface voxels in the occupancy map
+  std::uint32_t first_number = 0;                     // of its first surface voxel in the occupancy map
   std::uint32_t budget = 0;                           // background voxel updates a tick
   polygon::TriangleMesh drawn;                        // volume frame, at rest
   std::size_t thinned = 0;                            // voxels that thinning left out
@@ -69,7 +69,7 @@ struct SoftBody {  // the constant half of a soft object; WorldState::soft is th
   }
 };
 
-// A rigid body's present pose, body to scene. A matrix, because the tick transforms many points.
+// A rigid body's present pose, body to scene, with a matrix because the tick transforms many points.
 struct BodyFrame {
   glm::dmat3 rotation{1.0};
   glm::dvec3 position_m{0.0};
@@ -90,21 +90,21 @@ struct World {
   std::vector<SoftBody> soft;
   Tool tool;
   device::ForceLimits limits;
-  std::optional<device::PassivityOptions> passivity;  // empty: no controller
-  // Radius of the ball that a point tool becomes: 1e-7 of the scene, far above rounding and far below
-  // anything felt.
+  std::optional<device::PassivityOptions> passivity;  // empty: no passivity controller
+  // A point tool is treated as a ball of this radius: 1e-7 of the scene's extent, far above rounding and far
+  // below anything felt.
   double skin_m = 0.0;
   double extent_m = 0.0;    // diagonal of the box of all objects
   double rounding_m = 0.0;  // bound of the rounding error of a scene coordinate
   double encoder_m = 0.0;   // resolution of the device's position
   bool use_map = true;      // false: every object is queried in every tick; the baseline for the map's timing
   bool damping_account = true;  // false: sampled damping without correction; the baseline with a known theory
-  // Pairs of soft objects that may meet: surface voxels of the first (the finer one) against the surface of
-  // the second.
+  // Pairs of soft objects that may meet. Surface voxels of the first object (the finer one) are stopped by
+  // the surface of the second.
   std::vector<std::array<std::uint32_t, 2>> soft_pairs;
 
   [[nodiscard]] std::size_t object_count() const { return rigid.size() + soft.size(); }
-  // Radius of the ball that rigid surfaces keep out (m).
+  // Radius of the tool's ball at rigid surfaces (m).
   [[nodiscard]] double contact_radius_m() const { return std::max(tool.radius_m, skin_m); }
   // Sets extent_m, rounding_m and skin_m for objects within the box.
   void set_scale(const glm::dvec3& low, const glm::dvec3& high) {

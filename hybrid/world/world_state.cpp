@@ -6,7 +6,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFirstMargin = 1.0 / 64.0;  // margin of the proxy's first survey, of the object's extent
+constexpr double kFirstMargin = 1.0 / 64.0;  // margin of the proxy's first survey (unit: the object's extent)
 
 }  // namespace
 

@@ -35,7 +35,7 @@ struct FacetContact {
   std::array<voxel::PressedPair, 2> extra_facets{};
   std::size_t extra_count = 0;
   std::uint32_t surface_a = 0;
-  bool held = false;  // near enough to press: the contact alone moves its voxels
+  bool held = false;  // near enough to press: only the contact moves its voxels
 };
 
 // Named faults of a tick; the report says each in words, with the setting to raise where there is one.
@@ -63,12 +63,12 @@ inline constexpr std::size_t kMaxMapHits = 32768;  // map entries read in one lo
 struct RigidState {
   BodyFrame frame;               // the present pose
   Pose pose;                     // the same as position and quaternion
-  FreeBodyState free;            // if it is a free body
-  Pose before;                   // if it presses tissue: its pose before this tick
-  std::uint32_t rest_ticks = 0;  // consecutive ticks in which it (nearly) did not move
+  FreeBodyState free;            // state, if the object is a free body
+  Pose before;                   // pose before this tick, if the object presses tissue
+  std::uint32_t rest_ticks = 0;  // consecutive ticks in which the object hardly moved
   polygon::Neighbourhood near;
-  double margin_m = 0.0;  // of the next survey; adapted to the number of elements in the last one:
-  double counted = 0.0, margin_counted_m = 0.0;  // that number, and the last margin
+  double margin_m = 0.0;                         // margin of the next survey
+  double counted = 0.0, margin_counted_m = 0.0;  // number of elements in the last survey, and its margin
   polygon::CrossableEdges crossable_edges;       // of the element that last held the proxy alone
 };
 
@@ -81,61 +81,62 @@ struct ActiveElement {
 // Result of a surface voxel's last rigid-distance query.
 struct ObstacleQuery {
   glm::vec3 from{0.0F};   // displacement of the voxel at the query (m)
-  bool replaced = false;  // the obstacle at rest is in obstacles_at_rest
-  float clear_m = 0.0F;   // distance from its centre to the nearest surface, or the search range
+  bool replaced = false;  // obstacle and query at rest are kept in obstacles_at_rest
+  float clear_m = 0.0F;   // distance from the voxel's centre to the nearest surface; at most the search range
 };
 
-// On nested patches tissue is at rest as soon as its contact ends, and so are its obstacles: these are the
-// obstacle and the query of a surface voxel that the contact moved.
+// Obstacle and query that a surface voxel had before a contact on nested patches moved it. They are restored
+// when the contact ends, because the tissue is then at rest at once.
 struct ObstacleAtRest {
   std::uint32_t surface_number = 0;
   voxel::Obstacle obstacle;
   ObstacleQuery query;
 };
 
-// State that goes from tick to tick as plain values: assignment copies the state.
+// State that is carried from tick to tick in plain values. Assignment copies it.
 struct CarriedState {
   // ---- of the session ----
   EditedValues edited;
   glm::dvec3 proxy_m{0.0};   // scene frame
-  glm::dvec3 device_m{0.0};  // last good input
+  glm::dvec3 device_m{0.0};  // last valid input
   device::ForceLimitState limit;
   device::PassivityState passive;
   std::uint64_t tick = 0;
-  device::Clock clock;                // simulated time, of the bodies' paths
+  device::Clock clock;                // simulated time, on which the bodies' paths depend
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite
   std::uint32_t faults = 0;           // FaultBit, accumulated over the session
-  std::uint64_t truncated_ticks = 0;  // ticks that a bound on the proxy's steps ended before it arrived
+  std::uint64_t truncated_ticks = 0;  // ticks in which a bound on the proxy's steps stopped it on its way
 
   // ---- of the proxy ----
-  double learnt_stiffness_N_per_m = 0.0;  // of tissue, beyond the model of its pressed voxels
+  double learnt_stiffness_N_per_m = 0.0;  // stiffness of tissue beyond the model of its pressed voxels
   // Half-spaces of voxels that could not leave the tool's way when last pressed (scene frame).
   std::vector<polygon::ContactPlane> jammed;
   std::vector<RigidState> rigid;          // [rigid]
-  glm::dvec3 swept_to_m{0.0};             // end of the last sweep, at which the cached planes are valid
+  glm::dvec3 swept_to_m{0.0};             // end of the last sweep; the cached planes are valid there
   std::array<ActiveElement, 3> active{};  // the proxy's active constraints
   std::uint32_t active_count = 0;
   bool stuck = false;          // friction keeps the proxy on the active elements
-  bool sliding = false;        // or lets it slide there
-  bool pushed = false;         // a body moved the proxy since, possibly off the active elements
-  glm::dvec3 friction_N{0.0};  // on the proxy: what friction and shading add to the normal force
-  std::uint32_t rubbed = 0;    // the rigid object of `friction_N`, which carries the proxy
+  bool sliding = false;        // friction lets the proxy slide on the active elements
+  bool pushed = false;         // since the last sweep a body moved the proxy, possibly off the elements
+  glm::dvec3 friction_N{0.0};  // force on the proxy that friction and shading add to the normal force
+  std::uint32_t rubbed = 0;    // rigid object that exerts friction_N and carries the proxy
   DampingState damping;
-  // Rigid objects that the map has within `look_m` of `look_at`, along each axis.
+  // `look_mask`: the rigid objects that the map has within `look_m` of `look_at` along each axis.
   glm::dvec3 look_at{0.0};
   double look_m = -1.0;
   std::uint64_t look_mask = 0;
 
   // ---- of arbitration ----
-  std::vector<voxel::Reaction> reactions;  // [soft] on the tool when it last pressed, scene frame
+  std::vector<voxel::Reaction> reactions;  // [soft] reaction on the tool when it last pressed, scene frame
   std::vector<FacetContact> facet_contacts;
-  std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel of the first]
+  std::vector<std::vector<std::uint8_t>> paired;               // [soft pair][surface voxel] 1: in contact
   std::vector<std::vector<ObstacleQuery>> obstacle_queries;    // [soft][surface voxel]
-  std::vector<std::vector<ObstacleAtRest>> obstacles_at_rest;  // [soft] replaced since its contact began
-  std::vector<std::uint32_t> cursor, obstacle_cursor;          // [soft] next surface voxel, in turns
+  std::vector<std::vector<ObstacleAtRest>> obstacles_at_rest;  // [soft] replaced since the contact began
+  std::vector<std::uint32_t> cursor, obstacle_cursor;          // [soft] next surface voxel to visit
   std::vector<std::uint32_t> pair_cursor;                      // [soft pair]
   std::vector<BodyObstacles> body_obstacles;                   // [soft]; empty where no body presses tissue
-  // For bodies that press tissue: bound on the motion of any point since the session began, and in this tick.
+  // For bodies that press tissue: bounds on the motion of any point since the session began, and in this
+  // tick.
   std::vector<double> body_travel_m, body_moved_m;  // [rigid]
   BodyCollisions collisions;
 };
@@ -146,7 +147,7 @@ struct WorldState : CarriedState {
   void prepare(const World& world);
 
   std::vector<std::unique_ptr<voxel::SoftObject>> soft;  // one for each World::soft
-  AsyncRelaxation async;                                 // of the objects that another thread relaxes
+  AsyncRelaxation async;                                 // of the objects that are relaxed asynchronously
   OccupancyMap map;
   OccupancyMap::Trail map_trail;  // of the tick's look-ups; a cache, without effect on results
   TickScratch scratch;
@@ -175,7 +176,7 @@ inline const SurfaceFeel& feel_of(const World& world, const CarriedState& state,
   return edited ? *edited : world.rigid[rigid].feel;
 }
 
-// Appends to the body contacts of this tick; without room, sets a fault and returns false.
+// Appends to the body contacts of this tick. If there is no room, sets a fault and returns false.
 inline bool add_contact(WorldState& state, const BodyContact& contact) noexcept {
   std::vector<BodyContact>& contacts = state.scratch.body_contacts;
   if (contacts.size() == contacts.capacity()) {

@@ -12,26 +12,26 @@
 namespace hybrid {
 namespace {
 
-// Exact queries a tick and soft object: 50 to 100 ns each for a primitive, 1 to 2 µs for a mesh.
+// Exact queries per tick and soft object. One takes 50 to 100 ns for a primitive and 1 to 2 µs for a mesh.
 constexpr std::size_t kMaxSurfaceQueries = 3000, kMaxMeshQueries = 750;
-constexpr double kWatchedRange = 1.5;  // spacings from a body within which a voxel has its half-space
-constexpr double kQueryAhead = 8.0;    // spacings that one query looks further, so that the next is not soon
-// Of the spacing: a voxel near a body that stands is queried again after this motion.
+constexpr double kWatchedRange = 1.5;  // spacings: a voxel this near to a body has a half-space of it
+constexpr double kQueryAhead = 8.0;    // spacings added to a query's range, so that the next is not due soon
+// Spacings: a voxel near a standing body is queried again after it moved this far.
 constexpr double kRequeryMotion = 0.02;
-// Of the spacing: a deep voxel comes out by this and by the body's motion in one tick.
+// Spacings: a deep voxel leaves a body by at most this much plus the body's motion in a tick.
 constexpr double kExitStep = 0.25;
-constexpr double kLiesOn = 1e-3;  // of the spacing: a voxel this near to its half-space lies on it
-// Spacings from a fixed surface within which that surface has the voxel's half-space.
+constexpr double kLiesOn = 1e-3;  // spacings: a voxel this near to the plane of its half-space lies on it
+// Spacings: a fixed surface this near gives the voxel its half-space, even if a body is nearer.
 constexpr double kNearFixed = 0.3;
-constexpr double kLeastGapSine =
-    0.4;                             // sine of the angle between body and bone: a narrower gap has no way out
-constexpr double kNoWayOut = 0.5;    // of the spacing: a voxel that is deeper after the wave has no way out
-constexpr double kOnSurface = 1e-9;  // of the spacing
-constexpr double kLongestStep = 0.5;  // of the spacing: longest step of a body …
-constexpr int kMaxSteps = 8;          // … and largest number of steps in a tick
-constexpr double kSqueezed = 0.05;    // of the spacing: a deeper overlap is a fault
-constexpr int kMaxRounds = 4;         // in a step, alternations of a free body going back and tissue leaving
-constexpr double kStopDepth = 0.25;   // of the spacing: a free body this deep in tissue stops
+// Sine of the angle between body and bone. A narrower gap has no way out.
+constexpr double kLeastGapSine = 0.4;
+constexpr double kNoWayOut = 0.5;     // spacings: a voxel that is deeper after the wave has no way out
+constexpr double kOnSurface = 1e-9;   // spacings: a point this near to a surface counts as on it
+constexpr double kLongestStep = 0.5;  // spacings: longest step of a body
+constexpr int kMaxSteps = 8;          // largest number of steps in a tick
+constexpr double kSqueezed = 0.05;    // spacings: a deeper overlap is a fault
+constexpr int kMaxRounds = 4;         // per step: rounds of a free body and tissue giving way
+constexpr double kStopDepth = 0.25;   // spacings: a free body this deep in tissue stops
 
 bool is_set(const voxel::Obstacle& o) {
   return o.normal != glm::vec3(0.0F);
@@ -47,7 +47,7 @@ struct Moment {
   double t_s = 0.0, to_come = 0.0;
 };
 
-// Pose of a body at that moment; a free body moves straight from its previous pose.
+// Pose of a body at `moment`. A free body moves straight from its previous pose to its present one.
 Pose pose_at(const World& world, const WorldState& state, std::uint32_t b, const Moment& moment) noexcept {
   if (!is_free(world, b)) return world.rigid[b].motion.pose_at(moment.t_s);
   const Pose &before = state.rigid[b].before, &now = state.rigid[b].pose;
@@ -109,14 +109,14 @@ class TissueAtBodies {
       }
       due.resize(most);
     }
-    // The map's lists are in the order of motion; sorted, the result does not depend on history.
+    // The map lists voxels in the order in which they moved. Sorting makes the result independent of that.
     std::sort(due.begin(), due.end(), [](const DueQuery& a, const DueQuery& b) {
       return a.body != b.body ? a.body < b.body : a.surface_number < b.surface_number;
     });
     for (const DueQuery& d : due) query(d.body, d.surface_number);
   }
 
-  // Gives each voxel near a body its half-space in force, and moves it out if it is inside.
+  // Chooses the half-space of each voxel near a body, and moves voxels out that are inside a body.
   void press() noexcept {
     auto& in_the_way = state_.scratch.in_the_way;
     in_the_way.clear();
@@ -136,8 +136,8 @@ class TissueAtBodies {
     if (in_the_way.empty()) return;
     for (const std::uint32_t s : beside_.near) tolerate_depth(s);
     object_.leave_obstacles(in_the_way);
-    // Voxels that the wave took into bone come out of it, also if bone is within the body. Voxels that were
-    // let in leave as they relax.
+    // Voxels that the wave moved into bone are moved out again, even where the bone is inside the body.
+    // Voxels whose depth in a body was tolerated leave by relaxation.
     in_the_way.clear();
     for (const std::uint32_t s : beside_.near) {
       choose_obstacle(s);
@@ -161,7 +161,8 @@ class TissueAtBodies {
     for (const std::uint32_t s : beside_.near) choose_obstacle(s);
   }
 
-  // The half-space in force: that of the nearer surface; near a fixed surface always the fixed one's.
+  // Sets the voxel's half-space to that of the nearer surface. Near a fixed surface it is always that of the
+  // fixed surface.
   void choose_obstacle(std::uint32_t s) noexcept {
     const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
     const glm::dvec3 u = displacement(s);
@@ -178,7 +179,8 @@ class TissueAtBodies {
     if (is_set(old) && slack_m(old, u) < kLiesOn * spacing_m_) object_.mark_dirty(s);
   }
 
-  // Is tissue deeper in a body than allowed? Anchors, which do not leave its way, count too.
+  // Is tissue deeper in a body than allowed? Anchored voxels count too, although they cannot leave the body's
+  // way.
   [[nodiscard]] bool squeezed() noexcept {
     double worst = -kSqueezed * spacing_m_;
     std::uint32_t where = BodyObstacles::kNobody;
@@ -196,8 +198,8 @@ class TissueAtBodies {
   }
 
  private:
-  // A voxel that is far inside and could not leave is let through the body. If pushed on, it would leave on
-  // whichever side is nearest, and be caught behind the body.
+  // A voxel that is far inside and could not leave is let through the body. If it were pushed on, it would
+  // leave on the nearest side and might be caught behind the body.
   void let_deep_through() noexcept {
     for (const std::uint32_t s : beside_.near) {
       // A free body gives way itself.
@@ -209,14 +211,15 @@ class TissueAtBodies {
       state_.faults |= fault_body_squeezed;
     }
   }
-  // Links at their limits may have kept tissue in place far from rest, where relaxation left it alone. When
-  // the last body has left, all of it must relax.
+  // Links at their limits may have held squeezed tissue far from equilibrium, and relaxation may have skipped
+  // it. When the last body has left, all tissue must relax.
   void mark_all_dirty() noexcept {
     if ((state_.faults & fault_body_squeezed) == 0) return;
     for (std::size_t s = 0; s < object_.lattice().surface().size(); ++s) object_.mark_dirty(s);
   }
-  // Is a voxel in a body, and is there a way out that does not lead into a fixed surface? If the shortest way
-  // does, the voxel's obstacle becomes one for the way along that surface, until the voxel is out.
+  // Is voxel s inside a moving body, and is there a way out that does not lead into a fixed surface? If the
+  // shortest way out leads into one, the voxel gets a half-space that moves it out along the fixed surface,
+  // in each tick until it is out.
   bool set_way_out(std::uint32_t s) noexcept {
     const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
     if (!is_set(moving)) return false;
@@ -235,9 +238,10 @@ class TissueAtBodies {
         s, {glm::vec3(along / part), static_cast<float>(glm::dot(along / part, u) + depth / part), true});
     return true;
   }
-  // A jammed voxel cannot leave the tolerated depth altogether, so the wave does not require it to. Otherwise
-  // the wave would draw its neighbours, by links at their limits, into the body, and they it; of two voxels
-  // that are drawn apart it favours one, so that bodies would creep without end.
+  // Depth (m) by which a voxel may stay in a body. A jammed voxel cannot leave the body altogether, so the
+  // wave does not require it to. Otherwise the wave would pull neighbours of the voxel into the body, through
+  // links at their limits, and the neighbours would pull the voxel. Of two voxels that are pulled apart the
+  // wave favours one, so bodies would creep without end.
   [[nodiscard]] double tolerated_depth_m(std::uint32_t s) const noexcept {
     return beside_.jammed[s] != 0 ? kJammedProbe * spacing_m_ : 0.0;
   }
@@ -253,7 +257,7 @@ class TissueAtBodies {
   [[nodiscard]] BodyQuery& query_of(std::uint32_t b, std::uint32_t s) const noexcept {
     return beside_.queries[b][s];
   }
-  // How far body and voxel may still move together before the voxel may be within the watched range (m).
+  // How far (m) body and voxel together may still move before the voxel can be within the watched range.
   [[nodiscard]] double remaining_travel_m(std::uint32_t b, std::uint32_t s) const noexcept {
     const BodyQuery& seen = query_of(b, s);
     return seen.until_m - state_.body_travel_m[b] - glm::distance(displacement(s), glm::dvec3(seen.u));
@@ -279,7 +283,8 @@ class TissueAtBodies {
     const polygon::RigidSurface& surface = *world_.rigid[b].surface;
     const bool found = polygon::signed_distance(surface, at, range, known, out);
     if (found && std::abs(out.distance) > kOnSurface * spacing_m_) return found;
-    // On the surface itself the direction outward is undefined, and the last one may be another face's.
+    // On the surface itself the outward direction is undefined, and the last known one may belong to another
+    // face. A point slightly further from the body's middle is queried instead.
     const glm::dvec3 away = at - 0.5 * (surface.lower() + surface.upper());
     const double far = glm::length(away);
     if (!(far > 0.0) || (!found && far > range)) return found;
@@ -304,7 +309,7 @@ class TissueAtBodies {
     }
     if (whose != BodyObstacles::kNobody && whose != b && slack_m(beside_.moving[s], u) <= gap) return;
     const glm::dvec3 n = glm::inverse(body_.pose.rotation) * (frame_of(b).rotation * near.normal);
-    // A voxel that is deep, because it was squeezed, comes out a little each tick.
+    // A voxel that is deep because it was squeezed leaves the body a little in each tick.
     const double depth = std::min(-gap, moved + kExitStep * spacing_m_);
     beside_.moving[s] = {glm::vec3(n), static_cast<float>(glm::dot(n, u) + depth), true};
     whose = b;
@@ -325,9 +330,9 @@ class TissueAtBodies {
   BodyObstacles& beside_;
   double spacing_m_, watched_m_;
   Moment moment_;
-  BodyFrame frame_;  // of the body of the last frame_of()
+  BodyFrame frame_;  // frame of body frame_of_
   std::uint32_t frame_of_ = BodyObstacles::kNobody;
-  bool meshes_ = false;  // among the bodies
+  bool meshes_ = false;  // some of the bodies are meshes
 };
 
 }  // namespace
@@ -343,7 +348,7 @@ void query_bodies(const World& world, WorldState& state) {
 
 namespace {
 
-// Bodies are where they are at `moment`, having moved by body_moved_m since the last step.
+// Presses the bodies into tissue in their poses at `moment`. They moved by body_moved_m since the last step.
 void press_once(const World& world, WorldState& state, const Moment& moment) noexcept {
   for (std::size_t o = 0; o < state.body_obstacles.size(); ++o) {
     TissueAtBodies tissue(world, state, o, moment);
@@ -356,7 +361,8 @@ void press_once(const World& world, WorldState& state, const Moment& moment) noe
   }
 }
 
-// If tissue could not leave a free body's way, the body gives way; as it turns, other tissue may have to.
+// If tissue could not leave a free body's way, the body gives way. The body may turn, and other tissue may
+// then have to leave its way, so the two alternate.
 void stop_in_tissue(const World& world, WorldState& state, std::uint32_t b, const Moment& moment,
                     double dt_s) noexcept {
   Pose pose = pose_at(world, state, b, moment);

@@ -2,15 +2,15 @@
 // Tissue leaves the way of rigid bodies that move, and returns when they leave. tissue_supports_bodies.h has
 // the forces on free bodies.
 //
-// A surface voxel near such a body has a half-space obstacle, as one near bone has: the outside of the plane
-// through the body's nearest point. The half-space is made anew in every tick in which voxel or body moved. A
-// voxel that is inside leaves along the normal, all such voxels in one wave of the chain, and relaxation does
-// the rest. A voxel has one half-space: that of the nearer of body and bone, and within both that of the
-// bone.
+// A surface voxel near such a body has a half-space as its obstacle, as a voxel near bone has. It is the
+// outside of the plane through the body's nearest point, and is made anew in every tick in which voxel or
+// body moved. Voxels inside the body leave along the normal. One wave of the chain moves all of them, and
+// relaxation does the rest. A voxel has one half-space: that of the nearer of body and bone, or that of the
+// bone if the voxel is inside both.
 //
 // The map lists the voxels in the body's box. Each distance query notes how far body and voxel together may
-// move before the voxel can be near, and no query is made earlier. Nearly all exact queries are therefore of
-// voxels that are near.
+// move before the voxel can be near. No query is made earlier, so nearly all exact queries are for voxels
+// that are near.
 #pragma once
 
 #include "hybrid/world/world_state.h"
@@ -20,8 +20,8 @@ namespace hybrid {
 // On load, after find_obstacles(): queries the distance of all surface voxels to bodies that press tissue.
 void query_bodies(const World& world, WorldState& state);
 
-// In the tick, after the bodies moved by dt_s and before the proxy moves. Longer motions are divided into
-// steps of half a spacing: an edge that moved further in one step would push neighbouring voxels in different
+// In the tick, after the bodies moved by dt_s and before the proxy moves. Motions of more than half a spacing
+// are divided into steps: an edge that moved further in one step would push neighbouring voxels in different
 // directions.
 void press_bodies_into_tissue(const World& world, WorldState& state, double dt_s) noexcept;
 
@@ -31,8 +31,8 @@ void query_again(const World& world, WorldState& state, std::uint32_t b) noexcep
 // At the end of the tick: sets a fault if tissue could not leave a body's way.
 void flag_squeezed_bodies(const World& world, WorldState& state) noexcept;
 
-// The half-space that fixed surfaces give to surface voxel s of a soft object. Its obstacle in force is this
-// one or, if a body presses tissue, that of the nearest body.
+// The half-space that fixed surfaces give to surface voxel s of a soft object. The voxel's present obstacle
+// is this half-space or, if a body presses tissue, possibly that of the nearest body.
 [[nodiscard]] const voxel::Obstacle& standing_obstacle(const WorldState& state, std::size_t soft,
                                                        std::size_t s) noexcept;
 void set_standing_obstacle(WorldState& state, std::size_t soft, std::size_t s,

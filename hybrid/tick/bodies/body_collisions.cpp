@@ -12,22 +12,23 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSkin = 1e-4;        // of the smaller object's diagonal: distance at which surfaces are kept
-constexpr double kTouching = 1.5;     // skins: points that are no further are contacts from the beginning
-constexpr double kLeastGap = 0.5;     // skins: a point that comes nearer becomes a contact
-constexpr double kTakeBackAt = 0.75;  // skins: nearer points are taken back …
-constexpr double kMaxCorrection = 1.0;  // … by at most this many skins a tick
-constexpr double kOverlap = 0.02;       // of the smaller object: a deeper overlap is a fault
-// Times the stiffness that stops the lighter body within a tick: as good as rigid.
+constexpr double kSkin = 1e-4;          // gap kept between surfaces (unit: the smaller object's diagonal)
+constexpr double kTouching = 1.5;       // skins: points this near are contacts when the tick begins
+constexpr double kLeastGap = 0.5;       // skins: a point that comes nearer becomes a contact
+constexpr double kTakeBackAt = 0.75;    // skins: bodies with points nearer than this are moved apart
+constexpr double kMaxCorrection = 1.0;  // skins: largest such motion in a tick
+constexpr double kOverlap = 0.02;       // a deeper overlap is a fault (unit: the smaller object's diagonal)
+// Stiffness of contacts: as good as rigid. Unit: reduced mass / dt², which stops the approach within a tick.
 constexpr double kContactStiffness = 1e5;
-constexpr double kSamePlane = 1e-9;   // 1 − cosine between normals
-constexpr double kSlideRange = 0.05;  // of the smaller object: nearer points slide along their edges
-constexpr double kLeastSlide = 0.01;  // of their reach: shorter slides are skipped
-constexpr double kStride = 0.02;      // of the smaller object: step along a way
+constexpr double kSamePlane = 1e-9;  // 1 − cosine of the angle between normals of the same plane
+// Points nearer than this slide along their edges (unit: the smaller object's diagonal).
+constexpr double kSlideRange = 0.05;
+constexpr double kLeastSlide = 0.01;  // shorter slides are skipped (unit: the point's reach)
+constexpr double kStride = 0.02;      // step along a way (unit: the smaller object's diagonal)
 constexpr int kMostStrides = 32;
-constexpr int kRounds = 6;                           // of solving and following ways
+constexpr int kRounds = 6;                           // most repetitions of solving and following ways
 constexpr std::size_t kMaxCollisionQueries = 20000;  // exact queries a tick
-// Of the smaller object: range within which a body that gives way is stopped.
+// Range within which a body that gives way is stopped (unit: the smaller object's diagonal).
 constexpr double kStopRange = 0.05;
 
 class Collisions : private CollisionQueries {
@@ -43,7 +44,7 @@ class Collisions : private CollisionQueries {
       place_after();
       if (follow_ways(round)) break;
       if (round < kRounds) continue;
-      ++all_.round;  // queries made on the ways do not belong to bodies that stand still
+      ++all_.round;  // voids queries made on ways: bodies that stand still did not go there
       place_after();
       break;
     }
@@ -88,7 +89,7 @@ class Collisions : private CollisionQueries {
       member_[state_.scratch.free_bodies.object[m]] = m;
     place_after();
   }
-  // Adds a contact with gap `gap` (m), before either object gives way.
+  // Adds a contact. `gap`: its gap (m) before the free bodies of the contact move.
   void add_with_gap(BodyContact contact, double gap) noexcept {
     double mass = mass_of(contact.body);
     if (contact.other != BodyContact::kNone) {
@@ -103,7 +104,7 @@ class Collisions : private CollisionQueries {
     return state_.scratch.free_bodies.stepped[member].body->mass.mass_kg;
   }
 
-  // Contacts that exist as the tick begins.
+  // Adds the contacts that exist when the tick begins.
   void add_touching() noexcept {
     for (BodyPair& pair : all_.pairs) {
       if (!in_motion(pair)) continue;
@@ -120,8 +121,8 @@ class Collisions : private CollisionQueries {
       });
     }
   }
-  // Slides the point to where its edge is nearest to the other object, which is where it crosses an edge,
-  // unless it would overlap there.
+  // Slides the point along its edge to the place nearest to the other object. If two edges cross, that is the
+  // crossing. A point that would overlap there does not slide.
   void slide(const BodyPair& pair, Side side, std::size_t i, PointQuery& query) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     if (!p.has_ends() || !(query.gap_m > 0.0)) return;
@@ -136,7 +137,8 @@ class Collisions : private CollisionQueries {
     refresh_query(pair, side, i, there);
     if (there.gap_m > 0.0) query = there;
   }
-  // Both neighbours on its edge are contacts with the same plane, so that this contact adds nothing.
+  // Are both neighbours of the point on its edge in contact with the same plane? Then this contact adds
+  // nothing.
   [[nodiscard]] bool is_implied(const BodyPair& pair, Side side, std::size_t i) const noexcept {
     const std::vector<SurfacePoint>& points = world_.rigid[owner(pair, side)].points;
     const SurfacePoint& p = points[i];
@@ -157,8 +159,8 @@ class Collisions : private CollisionQueries {
                      state_.scratch.free_bodies.system, dt_s_);
   }
 
-  // Is every point's way free? A point whose way is not becomes a contact; in the last round its body stands
-  // still.
+  // Is every point's way free? A point whose way is not free becomes a contact. In the last round the bodies
+  // of its pair stand still instead.
   bool follow_ways(int round) noexcept {
     bool all_free = true;
     ++all_.round;
@@ -203,8 +205,9 @@ class Collisions : private CollisionQueries {
     const glm::dvec3 at = position(pair, side, i);
     return {now_[b].to_body(now_[a].to_scene(at)), after_[b].to_body(after_[a].to_scene(at))};
   }
-  // Follows a point in the other object's frame. `met`: in, its query as the tick began; out, the surface
-  // that it came too near to.
+  // Follows a point in the other object's frame. `met`: on entry, the point's query at the start of the tick;
+  // on return, the surface that the point came too near to, or else the query at the end of the way.
+  // `queried`: true on return if queries were made on the way.
   bool way_is_free(const BodyPair& pair, Side side, std::size_t i, NearestSurface& met,
                    bool& queried) noexcept {
     const SurfacePoint& p = point(pair, side, i);
@@ -224,7 +227,8 @@ class Collisions : private CollisionQueries {
                             before.gap_m < ahead ? ahead : 0.0);
       queried = true;
       if (met.gap_m < allowed) {
-        // At a thin object or at an edge, the way out may differ from the way in.
+        // At a thin object or at an edge, the way's start may not be in front of this surface. Then the
+        // surface of the previous query counts.
         if (in_front(met, from, p) < pair.skin_m) met = before;
         return false;
       }
@@ -232,8 +236,8 @@ class Collisions : private CollisionQueries {
     }
     return true;
   }
-  // Adds the half-space that a point met on its way, with the gap seen from the end of the last solution's
-  // way.
+  // Adds a contact with the half-space that a point met on its way. The gap is the one at the end of the way
+  // in the last solution, less the free bodies' motion in that solution.
   void add_contact_on_way(BodyPair& pair, Side side, std::size_t i, const NearestSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const auto [from, to] = way_of(pair, side, i);
@@ -247,7 +251,7 @@ class Collisions : private CollisionQueries {
                                        const SurfacePoint& p) noexcept {
     return glm::dot(met.normal, position - met.at_m) - p.radius_m;
   }
-  // How much nearer a prescribed surface comes by itself in this tick (m).
+  // How much nearer (m) a surface with prescribed motion comes by itself in this tick.
   [[nodiscard]] double prescribed_approach(const BodyContact& contact) const noexcept {
     return dt_s_ * glm::dot(contact.normal, contact.carried_m_per_s);
   }
@@ -266,7 +270,7 @@ class Collisions : private CollisionQueries {
     stepped.velocity_m_per_s = stepped.spin_rad_per_s = glm::dvec3(0.0);
   }
 
-  // Queries at the ends of the ways are those with which the next tick begins.
+  // The next tick begins with the queries that were made at the ends of the ways.
   void finish() noexcept {
     commit_poses();
     bool overlaps = false;
@@ -283,7 +287,8 @@ class Collisions : private CollisionQueries {
     }
     if (overlaps) take_overlaps_back();
   }
-  // Overlaps are taken back by displacement, without velocity: the only energy added is that of weight.
+  // Moves overlapping bodies apart without giving them velocity. The only energy added is the potential
+  // energy of weight.
   void take_overlaps_back() noexcept {
     const std::size_t own = state_.scratch.body_contacts.size();
     for (BodyPair& pair : all_.pairs) {

@@ -10,10 +10,11 @@
 namespace hybrid {
 namespace {
 
-constexpr double kOffSurface = 1e-6;     // share of the way to an object's middle
+constexpr double kOffSurface = 1e-6;     // shift off a surface (unit: distance to the object's middle)
 constexpr double kCurrentWithin = 0.01;  // skins: after less relative motion a query is still current
-constexpr double kQueryMargin = 0.5;  // of the smaller object: how much further than necessary a query looks
-// Of the smaller object: a near pair is queried again after this much travel.
+// A query looks this much further than necessary (unit: the smaller object's diagonal).
+constexpr double kQueryMargin = 0.5;
+// A near pair is queried again after this much travel (unit: the smaller object's diagonal).
 constexpr double kRequeryTravel = 0.1;
 
 glm::dvec3 middle_of(const RigidObject& object) noexcept {
@@ -74,7 +75,8 @@ NearestSurface CollisionQueries::nearest_surface(const BodyPair& pair, Side side
   ++queries_made_;
   bool found = polygon::signed_distance(surface, x, range, known, near);
   if (!found && near.distance == 0.0) {
-    // On the surface itself the outward direction is undefined: the point is on the side of its own object.
+    // On the surface itself the outward direction is undefined. The point counts as being on the side of its
+    // own object, so it is moved slightly towards that object's middle.
     const RigidObject& own = world_.rigid[owner(pair, side)];
     const glm::dvec3 middle =
         now_[opposite(pair, side)].to_body(now_[owner(pair, side)].to_scene(middle_of(own)));
@@ -115,7 +117,7 @@ BodyContact CollisionQueries::contact_at(const BodyPair& pair, Side side, std::s
   contact.body = body;
   contact.other = beside;
   if (beside == BodyContact::kNone) {
-    // The object that is no member of the step moves as prescribed.
+    // The object that is not among the stepped bodies moves as prescribed.
     const std::uint32_t o = member_[pair.other] == BodyContact::kNone ? pair.other : pair.free;
     const glm::dvec3 in_body = now_[o].to_body(contact.point_m);
     contact.carried_m_per_s = (after_[o].to_scene(in_body) - contact.point_m) / dt_s_;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Internal to body_collisions.cpp: poses, distance queries and contacts of pairs of rigid bodies.
 //
-// The bodies' poses before and after the tick are cached as frames. A query of a contact point stays valid
-// until its pair has moved: the distance is then a lower bound, less by the motion of both objects.
+// The bodies' poses before and after the tick are cached as frames. The query of a contact point is exact
+// until its pair moves. Afterwards its distance less the motion of both objects is a lower bound.
 #pragma once
 
 #include <cstddef>
@@ -53,13 +53,13 @@ class CollisionQueries {
     return travel(pair) - query.queried_at_m;
   }
 
-  // Both have hardly moved since the query, so that pairs at rest need no new one.
+  // Have both objects hardly moved since the query? Pairs at rest therefore need no new query.
   [[nodiscard]] bool is_current(const BodyPair& pair, const PointQuery& query) const noexcept;
 
-  // Poses before this tick. Objects on paths have moved already; moves of free bodies by tissue since the
-  // last tick are added to their travel.
+  // Sets now_ to the poses before this tick. Objects on paths have moved already, so their poses at the end
+  // of the last tick are used. Motion that tissue gave free bodies since then is added to their travel.
   void place_now() noexcept;
-  // Poses after this tick, with free bodies as their present solution has them.
+  // Sets after_ to the poses after this tick, for free bodies to those of the present solution.
   void place_after() noexcept;
   [[nodiscard]] bool in_motion(const BodyPair& pair) const noexcept {
     return member_[pair.free] != BodyContact::kNone || member_[pair.other] != BodyContact::kNone;
@@ -71,16 +71,19 @@ class CollisionQueries {
     return pair.until_m - travel(pair) > 0.0;
   }
 
-  // Queries the surface from place `x` in the other object's frame. A point that moved no further than
-  // `jump_m`, is nearer than that to the surface and now sees its other side went through it.
+  // Queries the surface from place `x` in the other object's frame. `known`: the normal at the point's
+  // previous query, or zero. A point went through the surface if three things hold: it moved at most
+  // `jump_m`, lies within `jump_m` of the surface, and is now on the side opposite to `known`. Its gap is
+  // then negative.
   [[nodiscard]] NearestSurface nearest_surface(const BodyPair& pair, Side side, const glm::dvec3& x,
                                                double radius_m, const glm::dvec3& known,
                                                double jump_m) noexcept;
-  // The last ways of a point were all shorter than its distance, so the query needs no memory of its side.
+  // Queries the point again if its query is no longer current. No earlier normal is needed: each way of the
+  // point was shorter than its distance to the surface, so it did not change sides.
   void refresh_query(const BodyPair& pair, Side side, std::size_t i, PointQuery& query) noexcept;
 
-  // The contact of a point with the surface that its query returned, without force. `of` and `at`: frames of
-  // the point's object and of the other one.
+  // The contact of a point with the surface that its query returned, without force. `of`: frames in which the
+  // point's object is taken; `at`: frames in which the other object is taken.
   [[nodiscard]] BodyContact contact_at(const BodyPair& pair, Side side, std::size_t i,
                                        const NearestSurface& query, const std::vector<BodyFrame>& of,
                                        const std::vector<BodyFrame>& at) const noexcept;

@@ -13,16 +13,17 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxWaysAside = 8;  // searches for a way aside when a body pushes the proxy into another
+constexpr int kMaxWaysAside = 8;  // most attempts to move the proxy aside when a body pushes it into another
 // A body rests after kRestTicks ticks in which it moves no further than kRestMotion (spacings) and the change
-// of force and the unbalanced force stay below kRestForce of the load. A resting body wakes when these bounds
-// are exceeded kWakeFactor times.
+// of force and the unbalanced force stay below kRestForce of the load. A resting body wakes when it exceeds
+// kWakeFactor times these bounds.
 constexpr std::uint32_t kRestTicks = 100;
 constexpr double kRestMotion = 1e-5, kRestForce = 1e-3, kWakeFactor = 3.0;
-// Of the ball: a proxy no further from where it was pushed counts as there.
+// A proxy this near to a place counts as being there (unit: the ball's radius).
 constexpr double kSamePlace = 1e-9;
 
-// Loads on the body from the last tick: the proxy's coupling, divided as its contacts divide it.
+// Loads of the proxy on the body in the last tick: the coupling force as the proxy's active elements share
+// it, and friction. Returns their number.
 std::size_t proxy_contacts(const World& world, const WorldState& state, std::uint32_t object,
                            std::array<BodyContact, 4>& contacts) noexcept {
   std::size_t count = 0;
@@ -48,7 +49,8 @@ double same_place_m(const World& world) noexcept {
   return kSamePlace * world.contact_radius_m() + 4.0 * world.rounding_m;
 }
 
-// The proxy is feasible against the body alone: moves it to a place that is feasible against everything.
+// At `pushed` the proxy is outside the body that pushed it, but maybe inside others. Moves the proxy to a
+// place that is outside all bodies.
 void step_aside(const World& world, WorldState& state, std::uint32_t object, const glm::dvec3& before,
                 const glm::dvec3& pushed) noexcept {
   const double near = same_place_m(world);
@@ -57,7 +59,7 @@ void step_aside(const World& world, WorldState& state, std::uint32_t object, con
     const Sweep others = sweep_past(world, state, object, true, from, way);
     state.proxy_m = others.point;
     if (glm::length(others.point - way) <= near) return;
-    // The others hold the proxy: the nearest place to it that the body allows.
+    // Other bodies hold the proxy. Finds the nearest place that the pushing body allows.
     const Sweep body = sweep_past(world, state, object, false, way, others.point);
     if (glm::length(body.point - others.point) <= near) return;
     from = others.point;
@@ -66,12 +68,12 @@ void step_aside(const World& world, WorldState& state, std::uint32_t object, con
   state.faults |= fault_infeasible;
 }
 
-// Friction holds the proxy on this body or lets it slide: it is carried along in either case.
+// Does this body carry the proxy along? It does if friction holds the proxy there or lets it slide.
 bool carries_proxy(const WorldState& state, std::uint32_t object) noexcept {
   return (state.stuck || state.sliding) && state.active_count > 0 && state.rubbed == object;
 }
 
-// The contact forces on the proxy turn with the body.
+// Turns the body's contact forces on the proxy with the body.
 void rotate_contact_forces(WorldState& state, std::uint32_t object, const glm::dmat3& turn) noexcept {
   for (std::uint32_t n = 0; n < state.active_count; ++n) {
     if (state.active[n].object == object) state.active[n].force_N = turn * state.active[n].force_N;
@@ -92,7 +94,7 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
     const glm::dvec3 from = near.frame.to_body(state.proxy_m);
     const glm::dvec3 target = carries_proxy(state, object) ? from : after.to_body(state.proxy_m);
     expected = after.to_scene(target);
-    // In the body's own frame the proxy moves instead.
+    // In the body's frame the body stands still, and the proxy moves instead.
     near.frame = BodyFrame();
     pushed = after.to_scene(sweep_past(world, state, object, false, from, target).point);
   }
@@ -141,7 +143,7 @@ OwnContacts list_loads(const World& world, WorldState& state, std::uint32_t o, s
   return own;
 }
 
-// On tissue: does the body stay at rest instead of taking its step?
+// Does a body on tissue stay at rest instead of taking its step?
 bool rests(const World& world, WorldState& state, std::uint32_t o, const FreeBodyState& next,
            const OwnContacts& own, double dt_s) noexcept {
   const RigidMotion& motion = world.rigid[o].motion;

@@ -16,22 +16,23 @@
 namespace hybrid {
 namespace {
 
-constexpr double kReleased = 0.002;  // of the spacing: a voxel that is no deeper is no longer jammed
-constexpr double kFreeLift = 0.005;  // of the spacing: lift a tick that the body's motion need not pay for
-constexpr double kOnBody = 1e-3;     // of the spacing: a voxel no further from the body lies on it
-// Of the sum of normals: regularises directions that the normals hardly span.
+constexpr double kReleased = 0.002;  // spacings: a voxel no deeper than this is no longer jammed
+constexpr double kFreeLift = 0.005;  // spacings: lift per tick for which no kinetic energy is needed
+constexpr double kOnBody = 1e-3;     // spacings: a voxel this near to the body lies on it
+// Regularises directions that the normals hardly span. Unit: trace of the sum of n nᵀ over the normals n.
 constexpr double kRegularisation = 1e-3;
-// Factor on the stiffness of links; the part beyond 1 acts as a damper. Under asynchronous relaxation tissue
-// is a spring between two results and returns in one what it took before another: without the damper bodies
-// hop.
+// Factor on the stiffness of links. The part beyond 1 acts as a damper. Under asynchronous relaxation tissue
+// is a spring between two results, and one result may return energy that tissue took up before another.
+// Without the damper bodies would hop.
 constexpr double kLinkDamping = 3.0;
-// The same for links at their limits. Their shares change in steps, which would make bodies dance.
+// The same factor for links at their limits. Their shares of a load change abruptly, which would make bodies
+// jitter.
 constexpr double kLimitDamping = 20.0;
-constexpr double kMovableTissue = 1e-2;  // factor for tissue that may leave the way of a body that goes back
-// Times the stiffness that stops the body within a tick: as good as rigid.
+constexpr double kMovableTissue = 1e-2;  // factor on the stiffness of stops at tissue that can still give way
+// Stiffness of stops: as good as rigid. Unit: mass / dt², which stops the body within a tick.
 constexpr double kStopStiffness = 1e4;
 
-// A surface voxel whose nearest body is the one in question.
+// A surface voxel whose nearest body is the body in question.
 struct NearVoxel {
   glm::dvec3 normal;  // out of the body, volume frame
   double gap_m;       // negative: inside the body
@@ -43,8 +44,9 @@ NearVoxel near_voxel(const voxel::SoftObject& object, const BodyObstacles& besid
   return {n, glm::dot(n, object.state().at(object.lattice().surface()[s])) - static_cast<double>(o.bound)};
 }
 
-// The contact of such a voxel, without force. Its point is where the body's surface was nearest at the query:
-// the voxel may have moved along its half-space since, and forces from there would turn a ball.
+// The contact of such a voxel, with zero force. Its point is the point of the body's surface that was nearest
+// at the query. The voxel may have moved along its half-space since. A force at its present place would turn
+// a ball.
 BodyContact contact_at(const SoftBody& body, const voxel::SoftObject& object, const BodyQuery& query,
                        std::uint32_t s, const NearVoxel& voxel_at) noexcept {
   const glm::dvec3 out = body.pose.rotation * voxel_at.normal;
@@ -72,7 +74,8 @@ bool is_jammed(const WorldState& state, std::size_t o, std::uint32_t s) noexcept
   return state.body_obstacles[o].jammed[s] != 0 || lattice.anchored(lattice.surface()[s]);
 }
 
-// Adds contacts that let the body come up to the voxels with which(o, s), and no nearer.
+// Adds contacts at the voxels for which which(o, s) is true. They stop the body where it overlaps such a
+// voxel by kJammedProbe.
 template <class Which>
 void add_stops(const World& world, WorldState& state, std::uint32_t b, double stiffness,
                const Which& which) noexcept {
@@ -105,8 +108,8 @@ bool presses(voxel::SoftObject& object, std::uint32_t s, const NearVoxel& voxel_
   return glm::dot(voxel_at.normal, stiffness * left) < 0.0;
 }
 
-// Lists the voxels of one object near body b that can move, those that press on the body first. Returns how
-// many of them press.
+// Lists the movable voxels of soft object o near body b. Those that press on the body come first. Returns how
+// many press.
 std::size_t list_pressing(WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   voxel::SoftObject& object = *state.soft[o];
   const BodyObstacles& beside = state.body_obstacles[o];
@@ -131,9 +134,9 @@ std::size_t list_pressing(WorldState& state, std::uint32_t b, std::size_t o) noe
   return pressed;
 }
 
-// How far a voxel moves towards the body (m; negative: it is in the body). If its chain keeps it from
-// arriving, the force that pulls it there passes to voxels on the body: only the distance that the links
-// allow may lessen its force.
+// How far (m) a voxel can move towards the body; negative: it is in the body. If the chain keeps the voxel
+// from reaching the body (`tight`), the force that pulls it passes to voxels on the body. So only the
+// distance that the links allow may reduce that force.
 double distance_to_body_m(const voxel::SoftObject& object, std::uint32_t s, const NearVoxel& voxel_at,
                           bool tight) noexcept {
   if (!tight || voxel_at.gap_m <= 0.0) return voxel_at.gap_m;
@@ -144,12 +147,13 @@ double distance_to_body_m(const voxel::SoftObject& object, std::uint32_t s, cons
   return glm::clamp(glm::dot(voxel_at.normal, u - place), 0.0, voxel_at.gap_m);
 }
 
-// Adds the contact forces of the listed voxels. Each has the force that pulls it into the body along its
-// normal. Links at their limits pass loads from voxel to voxel, also across the normals, so that only the sum
-// of these loads is known. The part of the sum that the normal forces lack is divided among these voxels
-// along their normals, with the least squares of the shares. (Added to each voxel as accounted, it would turn
-// a ball, which no surface without friction can do.) If a set of limits and obstacles that balances all loads
-// was found, its multipliers are the forces: the shares have no torque that a box could rest on.
+// Adds the contact forces of the listed voxels. The force of each contact is the one that pulls its voxel
+// into the body along the normal. Links at their limits pass loads from voxel to voxel, also across the
+// normals, so only the sum of these loads is known. The normal forces may lack a part of this sum. That part
+// is divided among the voxels at limits along their normals, with the least sum of squared shares. (If each
+// voxel got the load that the links account to it, a ball would turn, which no surface without friction can
+// cause.) If multipliers of limits and obstacles are known that balance all loads, they are the forces: the
+// shares have no torque that a box could rest on.
 void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   const voxel::SoftObject& object = *state.soft[o];
   const BodyObstacles& beside = state.body_obstacles[o];
@@ -183,7 +187,7 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
       add_contact(state, contact);
       continue;
     }
-    // A voxel that would not reach the body by itself presses only from where they meet.
+    // A voxel that would not reach the body by itself presses only from the place where the two meet.
     if (contact.force_N < 0.0) contact.force_N *= kLinkDamping;
     if (load.at_limit && pressed(n, voxel_at.normal) > 0.0) {
       contact.force_N += glm::dot(share, voxel_at.normal);
@@ -210,7 +214,8 @@ std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint
 
 namespace {
 
-// Lists contacts that take back overlaps beyond the probe. Returns false if no overlap exceeds `limit`.
+// Lists contacts that remove overlaps deeper than kJammedProbe, and marks voxels deeper than `limit`
+// (spacings) as jammed. Returns false if there are none deeper than `limit`.
 bool list_overlaps(const World& world, WorldState& state, std::uint32_t b, double limit,
                    double stiffness) noexcept {
   bool any = false;
@@ -234,8 +239,9 @@ bool list_overlaps(const World& world, WorldState& state, std::uint32_t b, doubl
   return any;
 }
 
-// A body that is moved back is also lifted. Its motion pays for the lift as far as it can. Tissue pays for at
-// most `free_lift_m` a tick, so that a body that is pressed in is not lifted out.
+// A body that is moved back may also be lifted. Its kinetic energy provides the energy of the lift as far as
+// possible. Tissue provides the energy for at most `free_lift_m` of lift per tick, so that a body that is
+// pressed in is not lifted out.
 FreeBodyState limit_by_energy(const FreeBody& body, const FreeBodyState& before, FreeBodyState after,
                               double free_lift_m) noexcept {
   const glm::dvec3 weight_N = body.mass.mass_kg * body.gravity_m_per_s2;
@@ -273,16 +279,17 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
   add_jammed_contacts(world, state, b, stiffness);
   add_collision_stops(world, state, b, stiffness);
   const std::size_t rigid = state.scratch.body_contacts.size();
-  // Into other tissue only as far as necessary: the least-mass motion may be a turn that goes far.
+  // The body enters other tissue only as far as necessary. Without these stops the motion of least kinetic
+  // energy may be a turn that goes far into tissue.
   add_stops(world, state, b, kMovableTissue * stiffness,
             [&](std::size_t o, std::uint32_t s) { return !is_jammed(state, o, s); });
-  // The position after the step takes the body out of the overlap; its velocity is not kept …
+  // The first step moves the body out of the overlap. Only the pose after this step is kept.
   FreeBodyState before = state_at(body, pose), out = before;
   before.velocity_m_per_s = near.free.velocity_m_per_s;
   before.spin_rad_per_s = near.free.spin_rad_per_s;
   FreeBodyState stopped = before;
   const bool found = step_free_body(body, out, state.scratch.body_contacts, dt_s);
-  // … and the velocity into the tissue ends.
+  // The second step ends the velocity into the tissue. Only the velocity after this step is kept.
   for (std::size_t n = 0; n < overlaps; ++n) state.scratch.body_contacts[n].force_N = 0.0;
   if (!found || !step_free_body(body, stopped, std::span(state.scratch.body_contacts).first(rigid), dt_s)) {
     state.faults |= fault_nonfinite_body;
@@ -327,8 +334,8 @@ void push_bodies_out_of_tissue(const World& world, WorldState& state, double dt_
       const double spacing_m = object.lattice().min_spacing_m();
       std::uint8_t& jammed = state.body_obstacles[o].jammed[s];
       if (gap_m > -kReleased * spacing_m) jammed = 0;
-      // Set for every overlap beyond the probe: bodies that were only lifted out once too deep never came to
-      // rest.
+      // Every overlap beyond the probe counts. If bodies were only lifted out once they are too deep, they
+      // would never come to rest.
       if (gap_m < -kJammedProbe * spacing_m) jammed = 1;
     });
   }

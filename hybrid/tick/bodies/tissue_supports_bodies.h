@@ -4,14 +4,14 @@
 //
 // Each such voxel is a contact of its own. Its force is the multiplier of the half-space: the force with
 // which its links would pull the voxel into the body. Its stiffness is that of all its links with the
-// neighbouring voxels fixed, which bounds the response of tissue within a tick. The body therefore pays at
-// least the energy that the links store when it presses a voxel, and tissue that relaxes afterwards only
-// loses energy. A voxel that the body has not reached yet is a contact from where they meet; otherwise a
-// thrown body would press tissue in its first tick without paying.
+// neighbouring voxels fixed, which bounds the response of tissue within a tick. When the body presses a
+// voxel, it therefore loses at least the energy that the links store. Relaxation afterwards only reduces the
+// energy of tissue. A voxel that the body has not reached yet is a contact that begins where the two meet.
+// Otherwise a thrown body would press tissue in its first tick without losing energy.
 //
-// A voxel that links at their limits, anchors or bone keep in the body's way is jammed: a tick ended with the
-// voxel in the body. Jammed voxels are as good as rigid: they end the body's motion without throwing it back,
-// and a body that is too deep is moved back.
+// A voxel is jammed if links at their limits, anchors or bone keep it in the body's way, so that a tick ends
+// with the voxel in the body. Jammed voxels are as good as rigid: they end the body's motion without throwing
+// it back, and a body that is too deep is moved back.
 #pragma once
 
 #include "hybrid/world/world_state.h"
@@ -21,8 +21,8 @@ namespace hybrid {
 // Spacings: a body that is deeper in tissue at the end of a step or tick is moved back.
 inline constexpr double kTooDeep = 0.02;
 
-// Depth in spacings by which a body may overlap a jammed voxel. The remaining overlap shows when the voxel is
-// released.
+// Depth in spacings by which a body may overlap a jammed voxel. Some overlap must remain: a voxel that can
+// leave again shows it by a smaller overlap.
 inline constexpr double kJammedProbe = 0.01;
 
 // The smallest spacing of all soft objects (m); there must be one.
@@ -37,7 +37,7 @@ std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint
 bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, const Pose& pose,
                         double limit, double dt_s) noexcept;
 
-// Relaxes tissue under bodies on paths, whose links are at their limits, towards its least energy.
+// Relaxes tissue under bodies on paths towards its least energy, where links are at their limits.
 void relax_under_paths(const World& world, WorldState& state) noexcept;
 
 // At the end of a tick, after all that moves tissue: moves every free body back that is too deep, and notes

@@ -11,18 +11,19 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kMaxAsync = 64;  // bits of AsyncRelaxation::arrived
-// Rows applied a tick. kMaxRowsApplied: of a result, about 100 µs. Beside a large patch at the contact: as
-// many rows as leave it enough work, kWorkOfRow each (their obstacle queries included), but at least
-// kLeastRows, because a result that waits delays the next one.
+// Rows of a result that are applied per tick: at most kMaxRowsApplied, which take about 100 µs. In a tick
+// with a cycle of a large contact patch, the remaining work of the tick is the limit; a row counts as
+// kWorkOfRow, including its obstacle queries. But at least kLeastRows are applied, because a result that
+// waits delays the next one.
 constexpr std::size_t kMaxRowsApplied = 250, kLeastRows = 100, kWorkOfRow = 16;
-// Parts in which the rows near a contact at rest are applied.
+// Number of parts in which a result's rows near a contact at rest are applied.
 constexpr int kResultParts = 8;
-// A submission or an application takes some 100 µs and up to 300. It waits up to kMaxWaits ticks for a tick
-// without a cycle of a large patch. Meanwhile the contact is asked to skip its cycles, and skips them as long
-// as the tool presses.
+// A submission or an application takes about 100 µs, and up to 300 µs. It waits up to kMaxWaits ticks for a
+// tick without a cycle of a large patch. Meanwhile the contact is asked to skip its cycles, and skips them as
+// long as the tool presses.
 constexpr int kMaxWaits = 3;
-// Rows that another core relaxes in the time of a tick. A fixed-step session gets its results as late as one
-// in real time.
+// Rows that another core relaxes in the time of a tick. A fixed-step session uses this to get its results as
+// late as a session in real time.
 constexpr std::uint64_t kRowsRelaxed = 400;
 // Ticks between a result and the next submission, in which the contact sees the full residual.
 constexpr std::uint64_t kTicksBetween = 3;
@@ -54,12 +55,13 @@ void submit(WorldState& state, AsyncObject& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.shadow.work() / kRowsRelaxed;
 }
 
-// One exchange a tick: a part of a result, the preparation of an exchange, a submission or a result, or some
-// far rows.
+// Makes at most one exchange in the tick: a part of a result, the preparation of an exchange, a submission, a
+// result, or some of a result's far rows.
 void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept {
   AsyncObject& object = *state.async.objects[o];
   voxel::SoftObject& soft = *state.soft[o];
-  // Noted when it is seen, not when it is applied, because the exchanges until then depend on it.
+  // A result's arrival is noted when it is seen, not when the result is applied, because the exchanges in
+  // between depend on it.
   if (object.submitted && !object.arrived && has_arrived(state.async, object, o, state.tick)) {
     object.arrived = true;
     arrived |= std::uint64_t{1} << o;
@@ -91,8 +93,8 @@ void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept
   if (gives && !waits) {
     submit(state, object, o);
   } else if (takes && !waits) {
-    // Applied in parts if the tool is at rest: the whole would be felt as a step. While the tool moves, the
-    // step is lost in its motion, and parts would only be later.
+    // If the tool is at rest, the result is applied in parts: as a whole it would be felt as a step. While
+    // the tool moves, the step is not noticed, and parts would only delay the result.
     object.shadow.apply_near(soft, soft.contact_is_still() ? kResultParts : 1);
     if (object.shadow.in_parts()) soft.skip_next_cycle();
     object.submitted = object.arrived = false;

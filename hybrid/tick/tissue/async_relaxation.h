@@ -11,7 +11,7 @@ namespace hybrid {
 // all from the 65th on stay in the tick. Allocates. With Arrival::thread the caller must also run a
 // RelaxationThread.
 void start_async_relaxation(WorldState& state, Arrival arrival);
-// Would soft object `o` be relaxed asynchronously then?
+// Does start_async_relaxation() apply to soft object `o`?
 [[nodiscard]] bool relaxes_asynchronously(const WorldState& state, std::size_t o);
 
 // The stage: at most one exchange (a submission, a result, or a part of one) per object and tick.

@@ -22,8 +22,8 @@ bool is_filled(const voxel::Lattice& lattice, const glm::dvec3& at) noexcept {
   return lattice.filled(lattice.grid().at(cell[0], cell[1], cell[2]));
 }
 
-// Does a tool at `point` touch tissue at rest? A tool that reaches no surface voxel is outside, or its middle
-// is in a voxel.
+// Does a tool at `point` touch tissue at rest? A tool that reaches no surface voxel is outside, unless its
+// middle is in a filled voxel.
 bool touches_tissue(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (is_filled(state.soft[o]->lattice(), world.soft[o].to_body(point))) return true;
@@ -41,7 +41,7 @@ bool touches_tissue(const World& world, WorldState& state, const glm::dvec3& poi
     const double reach = object.reach(world.tool.radius_m);
     if (glm::distance(world.soft[o].to_scene(object.position(v)), point) < reach) return true;
   }
-  return count == state.scratch.map_hits.size();  // more than fit: some may touch
+  return count == state.scratch.map_hits.size();  // there may be more than fit, and some may touch
 }
 
 bool touches_rigid(const World& world, const WorldState& state, const glm::dvec3& point) noexcept {

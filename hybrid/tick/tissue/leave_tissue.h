@@ -6,10 +6,10 @@
 
 namespace hybrid {
 
-// Moves the proxy out of all tissue at rest, along the lattice axis or diagonal of an object on which that is
-// shortest. The first ticks then press the tool in from there, as from any start outside. Call it before the
-// first tick, with the proxy outside everything rigid. False: the tool finds no free place; a session must
-// not start there.
+// Moves the proxy out of all tissue at rest, along the axis or diagonal of an object's lattice on which the
+// way out is shortest. The first ticks then press the tool in from there, as from any start outside. Call it
+// before the first tick, with the proxy outside everything rigid. False: there is no free place for the tool,
+// and the session must not start.
 bool leave_tissue(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid

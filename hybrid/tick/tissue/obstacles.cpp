@@ -15,15 +15,16 @@ namespace {
 
 constexpr std::uint32_t kObstacleSlice = 256;  // surface voxels whose motion is checked a tick
 constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
-// … in a tick in which a result arrived.
+// Further exact queries in a tick in which an asynchronous result moved rows.
 constexpr std::size_t kArrivedQueries = 40;
-constexpr double kInside = 0.01;  // of the spacing: a voxel that is deeper in a surface leaves it
-// A voxel queries again when it has moved by kMovedEnough and to within kUnknownAhead of where it might meet
-// a surface that it does not know (spacings). With an obstacle kKnownAhead is enough, because its ball of
-// half a spacing meets nothing earlier.
+constexpr double kInside = 0.01;  // spacings: a voxel deeper than this in a surface leaves it
+// kMovedEnough, kUnknownAhead and kKnownAhead are in spacings. A voxel queries again when two things hold: it
+// has moved by kMovedEnough, and it is within kUnknownAhead of where it might meet a surface that it does not
+// know. For a voxel with an obstacle the second distance is kKnownAhead, because its ball of half a spacing
+// meets no other surface earlier.
 constexpr float kMovedEnough = 0.25F, kUnknownAhead = 2.0F, kKnownAhead = 0.6F;
-// In objects with bricks, a voxel on its obstacle queries again when it slid by kSlideOnObstacle, so that it
-// follows a surface that turns. Links give way along their axes alone, and hardly need this.
+// In objects with bricks, a voxel on its obstacle queries again when it has slid by kSlideOnObstacle
+// (spacings), so that it follows a curved surface. Links give way only along their axes and hardly need this.
 constexpr float kSlideOnObstacle = 0.02F;
 
 }  // namespace
@@ -47,7 +48,8 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
 
 namespace {
 
-// From within a solid the nearest surface shows its wrong side, which would keep the voxel inside.
+// For a point inside a solid the direction away from the nearest surface points inwards, and would keep the
+// voxel inside. It is flipped.
 NearestRigid flip_if_inside(const World& world, const glm::dvec3& point, NearestRigid near) noexcept {
   const RigidObject& object = world.rigid[near.object];
   if (!near.found || !object.surface->inside(object.to_body(point))) return near;
@@ -72,7 +74,7 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
   const auto surface = object.lattice().surface();
   const double range = kObstacleRange * object.lattice().max_spacing_m();
   std::size_t count = 0;
-  // Also if nothing is near: the object may be pressed beyond the search range.
+  // Reserved even if nothing is near: the object may be pressed beyond the search range.
   object.reserve_obstacles();
   state.obstacle_queries[soft].assign(surface.size(), {});
   if (object.uses_patches()) state.obstacles_at_rest[soft].reserve(surface.size());
@@ -90,7 +92,8 @@ std::size_t find_obstacles(const World& world, WorldState& state, std::size_t so
 
 namespace {
 
-// The surface voxels that are due for a query of rigid surfaces, those first that may soonest meet one.
+// The surface voxels that are due for a query of rigid surfaces. Those that may meet a surface soonest come
+// first.
 class ObstacleQueue {
  public:
   ObstacleQueue(const WorldState& state, std::size_t soft)
@@ -106,7 +109,7 @@ class ObstacleQueue {
     const ObstacleQuery& seen = queries_[s];
     const glm::vec3 way = glm::vec3(object_.displacement(object_.lattice().surface()[s])) - seen.from;
     const float square = glm::dot(way, way);
-    // The surface that the voxel knows holds it; others are further away.
+    // A voxel with an obstacle is held by that surface; others are further away.
     const bool held = standing_obstacle(state_, soft_, s).normal != glm::vec3(0.0F);
     const float ahead = seen.clear_m / spacing_m_ - (held ? kKnownAhead : kUnknownAhead);
     const float enough = std::max(kMovedEnough, ahead) * spacing_m_;
@@ -114,7 +117,8 @@ class ObstacleQueue {
     const float room = held ? std::max(seen.clear_m, spacing_m_) : seen.clear_m - radius_m_;
     add({room - std::sqrt(square), s});
   }
-  // Does it lie on its obstacle, away from the last query? The load goes across the obstacle's normal then.
+  // Does the voxel lie on its obstacle, and has it slid away from the place of its last query? The surface
+  // there may have another normal.
   [[nodiscard]] bool slid_on_obstacle(std::uint32_t s, float square) const noexcept {
     const float slid = kSlideOnObstacle * spacing_m_;
     if (!object_.lattice().has_bricks() || square < slid * slid) return false;
@@ -134,7 +138,7 @@ class ObstacleQueue {
 
  private:
   struct Due {
-    float room_m;  // until it may meet a surface that it does not know
+    float room_m;  // distance until the voxel may meet a surface that it does not know
     std::uint32_t s;
   };
   void add(const Due& due) noexcept {
@@ -178,16 +182,17 @@ void query_obstacle(const World& world, WorldState& state, std::size_t o, std::u
   }
   const voxel::Obstacle old = standing_obstacle(state, o, s);
   voxel::Obstacle fresh = obstacle_of(body, object, v, near);
-  // The other side of a thin sheet: rounding squeezed the voxel through; the side it had before stays.
+  // An opposite normal is that of the other side of a thin sheet: rounding moved the voxel through. The voxel
+  // keeps the side that it had.
   if (old.normal != glm::vec3(0.0F) && glm::dot(old.normal, fresh.normal) < 0.0F) return;
-  // A voxel that overlaps comes out by at most kMovedEnough a query, never all at once. Left at its depth, a
-  // fast tool would press it deeper each tick, and through.
+  // A voxel that overlaps leaves by at most kMovedEnough per query, never all at once. If it stayed at its
+  // depth, a fast tool would press it deeper in each tick, and through the surface.
   const float enough = kMovedEnough * static_cast<float>(object.lattice().min_spacing_m());
   fresh.bound = std::min(fresh.bound, glm::dot(fresh.normal, u) + enough);
   set_standing_obstacle(state, o, s, fresh);
 }
 
-// After a contact on nested patches.
+// Restores the obstacles at rest after a contact on nested patches.
 void put_obstacles_to_rest(WorldState& state, std::size_t o) noexcept {
   for (const ObstacleAtRest& at_rest : state.obstacles_at_rest[o]) {
     set_standing_obstacle(state, o, at_rest.surface_number, at_rest.obstacle);
@@ -212,7 +217,7 @@ void refresh_obstacles(const World& world, WorldState& state) noexcept {
       if (object.patches_in_use() != nullptr) {
         for (const voxel::VoxelId v : object.near_on_grid()) due.consider(object.surface_number(v));
       }
-      // Slow motion without waves is found by going through the surface in turns.
+      // Slow motion, which makes no waves, is found by visiting all surface voxels in turns.
       const auto count = static_cast<std::uint32_t>(lattice.surface().size());
       for (std::uint32_t i = 0; i < std::min(kObstacleSlice, count); ++i) {
         prefetch_surface(object, state.obstacle_cursor[o]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid surfaces stop tissue: each surface voxel near one has a half-space that it may not leave, its
-// obstacle.
+// Rigid surfaces stop tissue. Each surface voxel near a rigid surface has an obstacle: a half-space that it
+// may not leave.
 #pragma once
 
 #include "hybrid/world/world_state.h"
@@ -27,12 +27,12 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
 // already overlaps keeps its depth. Returns how many voxels have an obstacle.
 std::size_t find_obstacles(const World& world, WorldState& state, std::size_t soft);
 
-// In the tick: voxels that moved query rigid surfaces again, a bounded number each tick, first those that may
-// soonest meet a surface that they do not know. Candidates are the voxels that the tool touches, the rows
-// that waves moved, and a slice of all.
+// In the tick: voxels that moved query rigid surfaces again, a bounded number per tick. Those that may
+// soonest meet a surface that they do not know come first. Candidates are the voxels that the tool touches,
+// the rows that waves moved, and a slice of all.
 void refresh_obstacles(const World& world, WorldState& state) noexcept;
-// The same for rows that an asynchronous result moved in this tick, possibly far. A voxel inside a surface
-// that it did not know leaves it at once.
+// Does the same for rows that an asynchronous result moved in this tick, possibly far. A voxel inside a
+// surface that it did not know leaves it at once.
 void refresh_obstacles_of_arrived_rows(const World& world, WorldState& state) noexcept;
 
 }  // namespace hybrid

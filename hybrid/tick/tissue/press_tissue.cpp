@@ -10,8 +10,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxHalvings = 6;           // of the range in which a crowded tool looks for voxels
-constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object that are updated a tick
+constexpr int kMaxHalvings = 6;           // most halvings of the search range if too many voxels are near
+constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object that are updated per tick
 
 const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in the scene
 
@@ -35,8 +35,8 @@ double soft_reach(const World& world, const WorldState& state) noexcept {
 
 namespace {
 
-// Lists, of the first `count` entries found, the voxels within reach plus `range` of the tool. False: an
-// object has more than fit.
+// Lists the voxels within reach plus `range` of the tool: those among the first `count` map_hits, and those
+// of objects pressed on nested patches. False: an object has more than fit.
 bool list_touched(const World& world, WorldState& state, const glm::dvec3& point, double range,
                   std::size_t count) noexcept {
   for (auto& list : state.scratch.touched) list.clear();
@@ -76,14 +76,15 @@ bool find_touched_voxels(const World& world, WorldState& state, const glm::dvec3
   const std::size_t count =
       state.map.soft_in(point - box, point + box, state.scratch.map_hits, state.map_trail);
   bool fits = count < state.scratch.map_hits.size() && list_touched(world, state, point, range, count);
-  // A tool of many spacings: a shorter range, which also bounds its motion in this tick.
+  // If a tool of many spacings has too many voxels near, the range is halved. The range also bounds the
+  // tool's motion in this tick.
   for (int n = 0; n < kMaxHalvings && !fits; ++n) {
     range *= 0.5;
     fits = list_touched(world, state, point, range, count);
   }
   if (!fits) state.faults |= fault_touch_overflow;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
-    // The map's lists are in the order of motion; sorted, the result does not depend on history.
+    // The map lists voxels in the order in which they moved. Sorting makes the result independent of that.
     std::sort(state.scratch.touched[o].begin(), state.scratch.touched[o].end());
     if (state.scratch.touched[o].empty() && state.soft[o]->touched().empty()) continue;
     state.soft[o]->touch(state.scratch.touched[o]);
@@ -101,7 +102,8 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
     if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
     const voxel::ToolInBody tool = tool_in_body(world, body, point);
-    // Two waves of the chain: voxels that the first one moved along need not be pushed out by the second.
+    // There are two waves of the chain. Voxels that the first wave moved along need not be pushed out by the
+    // second.
     if (delta != glm::dvec3(0.0)) object.follow(glm::inverse(body.pose.rotation) * delta);
     object.push_out(tool);
     object.relax_near(tool, sweeps);
@@ -166,7 +168,8 @@ void refresh_map(const World& world, WorldState& state) noexcept {
     if (!state.body_obstacles.empty()) {
       for (const std::uint32_t number : state.body_obstacles[o].near) look(number);
     }
-    if (object.asleep() && state.cursor[o] == 0) continue;  // a whole round since it fell asleep
+    // If the cursor of a sleeping object is at 0, all its voxels were updated since it fell asleep.
+    if (object.asleep() && state.cursor[o] == 0) continue;
     const auto count = static_cast<std::uint32_t>(surface.size());
     for (std::uint32_t i = 0; i < std::min(kMapSlice, count); ++i) {
       prefetch_surface(object, state.cursor[o]);

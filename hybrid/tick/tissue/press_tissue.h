@@ -13,13 +13,14 @@ bool find_touched_voxels(const World& world, WorldState& state, const glm::dvec3
                          double& range) noexcept;
 
 // The tool moved to `point` by `delta`: pressed voxels follow, those inside are pushed out, and the
-// neighbourhood relaxes by `sweeps`. Sets state.reactions to each object's reaction (scene frame).
+// neighbourhood relaxes by `sweeps` sweeps. Sets state.reactions to each object's reaction (scene frame).
 void press_tissue(const World& world, WorldState& state, const glm::dvec3& point, const glm::dvec3& delta,
                   int sweeps) noexcept;
 
 // Appends to `out`, up to its capacity, half-spaces of voxels that could not leave the way of a tool at
-// `point`. `immovable_only`: only of voxels that are immovable until their surroundings move. Half-spaces of
-// facets that are within `facets_within` of the centre (unit: the tool's reach) follow. Returns how many.
+// `point`. `immovable_only`: only of voxels that are immovable until their surroundings move. Then appends
+// half-spaces of facets that are within `facets_within` of the centre (unit: the tool's reach). Returns how
+// many were appended.
 std::size_t tool_bounds(const World& world, WorldState& state, const glm::dvec3& point, bool immovable_only,
                         double facets_within, std::vector<polygon::ContactPlane>& out) noexcept;
 
@@ -29,9 +30,9 @@ voxel::ToolInBody tool_in_body(const World& world, const SoftBody& body, const g
 // Largest distance from the tool's centre at which it can touch a voxel of any soft object (m).
 double soft_reach(const World& world, const WorldState& state) noexcept;
 
-// Is there an object whose contact is on nested patches? The map has such an object at rest.
+// Is there an object whose contact is on nested patches? The map holds such an object in its rest state.
 [[nodiscard]] bool contact_on_patches(const WorldState& state) noexcept;
-// Prepares objects on patches that are not pressed for a tool at `point` (scene frame).
+// For a tool at `point` (scene frame): prepares objects that use nested patches and are not pressed yet.
 void prepare_patches(const World& world, WorldState& state, const glm::dvec3& point) noexcept;
 // Updates surface voxels in the map: those near the tool or a body, and a slice of the rest.
 void refresh_map(const World& world, WorldState& state) noexcept;

@@ -13,19 +13,19 @@
 namespace hybrid {
 namespace {
 
-constexpr std::uint32_t kPairSlice = 256;  // surface voxels looked up for a partner a tick
-// Touching distances: contacts are made before the surfaces touch, so that none is jumped over before its
-// turn, and are dropped when further apart.
+constexpr std::uint32_t kPairSlice = 256;  // surface voxels per tick for which a partner is looked up
+// A contact is made within kFindRange (touching distances), before the surfaces touch, so that no voxel
+// passes the surface before its turn comes. It is dropped beyond kDropRange (touching distances).
 constexpr double kFindRange = 1.5;
 constexpr double kDropRange = 1.75;
 // Gap at which a contact begins and ends to move its voxels (unit: touching distance). The hysteresis
 // prevents oscillation of surfaces that part.
 constexpr double kHoldGap = 0.1, kReleaseGap = 0.3;
-// Ticks in which every contact that is too far apart to press gets one query.
+// A contact that is too far apart to press is queried once in this many ticks.
 constexpr std::size_t kFarContactTurns = 4;
 constexpr int kPairSweeps = 2;
 // kAloneRounds: rounds in which an object that the tool does not press gives way alone. kAloneDepth: the
-// deepest overlap for which it does (touching distances), which is that of slow motion.
+// deepest overlap for which it does so (unit: touching distance). Slow motion causes no deeper one.
 constexpr int kAloneRounds = 2;
 constexpr double kAloneDepth = 0.1;
 
@@ -126,7 +126,7 @@ double update_contact(const World& world, WorldState& state, FacetContact& pair)
     FacetContact before = pair;
     before.pressed = pressed;
     pair.held = held;
-    // Holds the new facets before it releases the old ones, so that voxels of both stay held.
+    // Holds the new facets before it releases the old ones, so that voxels that belong to both stay held.
     if (pair.held) {
       keep_facets(a, b, before, pair);
       for_facets(pair, [&](const voxel::PressedPair& p) { voxel::claim_pair(a, b, p); });
@@ -139,7 +139,7 @@ double update_contact(const World& world, WorldState& state, FacetContact& pair)
   });
 }
 
-// Judged by the facet of the last query.
+// May the contact press, judged by the facet of its last query?
 bool may_press(const World& world, WorldState& state, const FacetContact& pair) noexcept {
   return pair.held || visit_objects(world, state, pair.soft_pair, [&](const auto& a, const auto& b) {
            return voxel::gap_of_pair(a, b, pair.pressed) < kReleaseGap * pair.pressed.reach_m;
@@ -149,7 +149,7 @@ bool may_press(const World& world, WorldState& state, const FacetContact& pair) 
 void update_contacts(const World& world, WorldState& state) noexcept {
   for (std::size_t i = 0; i < state.facet_contacts.size();) {
     FacetContact& pair = state.facet_contacts[i];
-    // Most contacts only are near, and their facet search costs as much as all else.
+    // Most contacts are near but do not press. Searching their facets would cost as much as all else.
     if ((i + state.tick) % kFarContactTurns != 0 && !may_press(world, state, pair)) {
       ++i;
       continue;
@@ -164,7 +164,7 @@ void update_contacts(const World& world, WorldState& state) noexcept {
   }
 }
 
-// Voxels that a sweep took over the edge of their facet get their new facet before the next sweep. False:
+// Voxels that a sweep moved over the edge of their facet get their new facet before the next sweep. False:
 // there were none.
 bool follow_over_edges(const World& world, WorldState& state) noexcept {
   bool any = false;
@@ -193,8 +193,8 @@ voxel::GiveWay first_to_give(const World& world, WorldState& state, const FacetC
   return of_a ? voxel::GiveWay::second : voxel::GiveWay::first;
 }
 
-// Overlaps that links alone could not take back move the chains: first of the object that gives way first,
-// then of both, then, if anchors held one, of the other.
+// Moves whole chains to remove overlaps that relaxation of links could not remove. First the object that
+// first_to_give() names gives way, then both objects, and then, if anchors hold one, the other.
 void separate_pairs(const World& world, WorldState& state) noexcept {
   using voxel::GiveWay;
   for (FacetContact& pair : state.facet_contacts) {
@@ -240,7 +240,8 @@ void solve_soft_contacts(const World& world, WorldState& state) noexcept {
     for_pairs(voxel::load_pair);
   };
   load();
-  // Dependents of voxels in a pressed object may also depend on the tool, which has their load already.
+  // In an object that the tool presses, dependents of pair voxels may also depend on voxels under the tool,
+  // which have their load already.
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (state.reactions[o].pressed == 0) {
       state.soft[o]->find_pair_dependents();

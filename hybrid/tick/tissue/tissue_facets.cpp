@@ -32,7 +32,7 @@ Square square_at(const voxel::Lattice& lattice, voxel::VoxelId corner, int e, in
   return {{corner, by_e, far, by_f}, lattice.filled(far)};
 }
 
-// Is there a full cell on the side of the square that lies up or down along d?
+// Is there a full cell next to the square, on its upper or lower side along axis d?
 bool has_cell(const voxel::Lattice& lattice, const Square& square, int d, bool up) noexcept {
   for (const voxel::VoxelId v : square.voxels) {
     if (!lattice.filled(up ? lattice.up(v, d) : lattice.down(v, d))) return false;
@@ -48,8 +48,8 @@ double longest_link_m(const voxel::Lattice& lattice) noexcept {
   return most * lattice.max_spacing_m();
 }
 
-// The half-space of one triangle, if the triangle faces the centre within `within`. The tissue's surface is
-// `surface` outside the triangle. `normal`: not of unit length, out of the tissue.
+// The half-space of one triangle, if the triangle faces the centre and is within `within` (m) of it. The
+// tissue's surface lies `surface` (m) outside the triangle. `normal`: not of unit length, out of the tissue.
 bool bound_of(const std::array<glm::dvec3, 3>& at, const glm::dvec3& normal, const glm::dvec3& centre,
               double within, double surface, voxel::ToolBound& bound) noexcept {
   const double length = glm::length(normal);
@@ -94,7 +94,8 @@ bool in_resting_tissue(const voxel::SoftObject& object, const glm::dvec3& point)
 
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
                          std::span<voxel::ToolBound> out) noexcept {
-  // The face of a punch touches tissue at just this distance, and is pressed by the voxels under it.
+  // A punch needs no facets: its face touches tissue at just this distance, and the voxels under it press on
+  // it.
   if (tool.shape == voxel::ToolInBody::Shape::punch) return 0;
   const voxel::Lattice& lattice = object.lattice();
   // The surface of tissue is half a spacing outside its outermost voxels.
@@ -114,7 +115,7 @@ std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBod
   for (const voxel::VoxelId v : object.touched()) {
     const glm::dvec3 from = object.position(v) - tool.centre;
     if (glm::dot(from, from) > near * near) continue;
-    // The squares with this voxel as any corner: further corners need not be listed.
+    // Visits every square that has this voxel as one of its corners. The other corners need not be listed.
     for (int n = 0; n < 12; ++n) {
       const int d = n / 4, e = (d + 1) % 3, f = (d + 2) % 3;
       voxel::VoxelId corner = v;
@@ -129,7 +130,7 @@ std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBod
       for (std::size_t i = 0; i < 4; ++i) p[i] = object.position(square.voxels[i]);
       for (const std::array<std::size_t, 3> corners : {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 3}}) {
         const std::array<glm::dvec3, 3> at{p[corners[0]], p[corners[1]], p[corners[2]]};
-        // The ring turns about +d.
+        // The ring turns about +d by the right-hand rule, so `up` points along +d.
         const glm::dvec3 up = glm::cross(at[1] - at[0], at[2] - at[0]);
         voxel::ToolBound bound;
         if (bound_of(at, below ? up : -up, tool.centre, reach, surface, bound)) add(bound);

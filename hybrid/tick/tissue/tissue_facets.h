@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The tool's centre never passes through the surface of tissue.
 //
-// Tissue is pressed as balls at its voxels. A tool of about a spacing may part four voxels of the surface,
-// within the limits of their links, so far that it fits between the balls. The facets between the voxels
-// close these gaps.
+// Tissue is pressed as balls at its voxels. A tool about as large as a spacing may push four voxels of the
+// surface apart, within the limits of their links, until it fits between the balls. The facets between the
+// voxels close these gaps.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,10 @@
 
 namespace hybrid {
 
-// For a ball: writes half-spaces of facets (triangles of surface voxels) that face the tool's centre: the
-// centre must stay outside the tissue's surface, half a spacing outside each facet. `within`: distance from
-// that surface (m). Only facets that bound a full cell of eight voxels count: others have no inner side.
-// Returns how many; stops when `out` is full.
+// For a ball: writes half-spaces of facets (triangles of surface voxels) that face the tool's centre. The
+// centre must stay outside the tissue's surface, which lies half a spacing outside each facet. `within`:
+// largest distance of the centre from that surface (m). Only facets that bound a full cell of eight voxels
+// count: others have no inner side. Returns how many; stops when `out` is full.
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
                          std::span<voxel::ToolBound> out) noexcept;
 

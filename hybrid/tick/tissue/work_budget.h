@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The share of its counted work that a tick in real time does at a contact, so that ticks are not late on a
+// In real time a tick does only a share of its counted work at a contact, so that ticks are not late on a
 // slow machine.
 //
 // Work is counted, never timed, so that the same inputs give the same bits; only the time that it takes
@@ -22,14 +22,15 @@ class WorkShare {
 
   explicit WorkShare(double period_s) : limit_us_(kShareOfPeriod * 1e6 * period_s) {}
 
-  // The share that the next tick is to have, in steps of a quarter of an octave below all of the work.
+  // The share that the next tick gets, as a number of steps below the whole work. A step is a factor of
+  // 2^(1/4).
   [[nodiscard]] std::uint8_t steps() const { return steps_; }
-  // Fraction of all the work: 1 down to a third.
+  // The share as a fraction of the whole work: from 1 down to 0.35.
   [[nodiscard]] static double share(std::uint8_t steps) noexcept {
     return std::exp2(-0.25 * std::min(steps, kMostSteps));
   }
-  // Call with a tick's own CPU time. Ticks without pressed tissue say nothing about the work and never raise
-  // the share.
+  // Call it with the CPU time of a tick. Ticks without pressed tissue say nothing about the work and never
+  // raise the share.
   void observe(double tick_us, bool tissue_pressed) noexcept {
     if (tick_us > limit_us_) {
       steps_ = static_cast<std::uint8_t>(
@@ -44,8 +45,8 @@ class WorkShare {
 
  private:
   static constexpr double kShareOfPeriod = 0.4;  // the rest is for the driver, and for ticks with more to do
-  static constexpr double kFarBeyond = 1.5;      // of the limit: the share then falls twice as fast
-  static constexpr double kFastTick = 0.8;  // of the limit: one more step of work still stays below the limit
+  static constexpr double kFarBeyond = 1.5;      // unit: the limit; beyond this the share falls twice as fast
+  static constexpr double kFastTick = 0.8;  // unit: the limit; below this one more step of work still fits
   static constexpr int kFastTicks = 60;
 
   double limit_us_;
