@@ -32,7 +32,7 @@ constexpr UnsupportedKey models_later[] = {
 };
 constexpr UnsupportedKey tool_later[] = {
     {"damping", "remove it: the coupling has no damping for now"},
-    {"friction", "remove it: all surfaces are smooth for now"},
+    {"friction", "remove it: friction is a key of [[rigid]] objects"},
 };
 
 void check_format(const SceneSource& source, const TreeNode& root) {
@@ -350,7 +350,7 @@ std::size_t max_lattice_voxels() {
   const double bytes = pages > 0 && page_bytes > 0
                            ? static_cast<double>(pages) * static_cast<double>(page_bytes)
                            : 4.0 * 1024 * 1024 * 1024;
-  // Voxels are numbered with 32 bits.
+  // VoxelId has 32 bits. Half of the numbers are left to the lattice's empty border.
   constexpr double most = 2147483647.0;
   return static_cast<std::size_t>(std::min(most, bytes / static_cast<double>(lattice_bytes_per_voxel)));
 }

@@ -4,7 +4,6 @@
 #include <map>
 
 namespace hybrid {
-namespace {}  // namespace
 
 MaterialsOfLabels materials_of_labels(const SoftDescription& description, const SoftBody& body) {
   MaterialsOfLabels result;

@@ -3,7 +3,7 @@
 // cubes, and the anchors.
 //
 // A cell lies between eight voxels. It exists if all of them do, and is as stiff as the softest of them
-// (link_stiffness.h). Cell counts are stored for cubes of 4 cells an edge and larger, in a fiftieth of a byte
+// (link_stiffness.h). Cell counts are stored for cubes of 4 cells an edge and larger, in a fortieth of a byte
 // per voxel; smaller cubes are counted from the labels. An object that fills its bounding box needs no
 // counts.
 //

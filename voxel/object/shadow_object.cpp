@@ -22,8 +22,8 @@ constexpr int kContactCycles = 4, kUnsettled = 4;
 // Cycles around a pressed rigid block that follow the whole cycle, too.
 constexpr int kBlockCycles = 4;
 constexpr double kMoved = 0.1;
-// Far from the contact a change is passed on only if it is kFarther times least_m_ (1e-4 of the spacing);
-// smaller ones are deferred until all is at rest. Rows within kNearRows of the contact are always passed on,
+// Far from the contact a change is passed on only if it is kFarther times least_m_ or more; smaller
+// ones are deferred until all is at rest. Rows within kNearRows of the contact are always passed on,
 // and so are submitted rows: a later submission would undo their deferred part.
 constexpr float kFarther = 20.0F;
 constexpr std::size_t kNearRows = 3;

@@ -90,6 +90,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
     result->contact_energy_ = contact_energy_;
     result->nearest_m_ = nearest_m_;
     result->grid_cycles_ = grid_cycles_;
+    result->grid_ticks_ = grid_ticks_;
   }
   if (relaxation_.left_to_shadow()) result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
   return result;

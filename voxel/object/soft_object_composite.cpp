@@ -186,7 +186,7 @@ bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
     centre_ = centre;
     on_grid_ = moved_ever_ = true;
     list_near_on_grid();
-    grid_cycles_ = 0;
+    grid_cycles_ = grid_ticks_ = 0;
     grid_force_N_ = glm::dvec3(0.0);
     contact_energy_.begin();
   }
@@ -302,14 +302,15 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
 // Axes to relax in the next cycle. An axis that carries little force changes little, so it is relaxed in
 // every second tick.
 std::array<bool, 3> SoftObject::axes_due() noexcept {
-  const std::uint32_t n = grid_cycles_++;
-  if (n < kAllAxes) return {true, true, true};
+  const bool first_of_tick = contact_work_ == 0;
+  if (first_of_tick) ++grid_ticks_;
+  if (grid_cycles_++ < kAllAxes) return {true, true, true};
   std::array<bool, 3> due{};
   const double felt = kFelt * glm::length(grid_force_N_);
   int others = 0;
   for (int d = 0; d < 3; ++d) {
     const bool carries = std::abs(grid_force_N_[d]) > felt;
-    const bool turn = contact_work_ == 0 && static_cast<std::uint32_t>(others) == n / 2 % 2;
+    const bool turn = first_of_tick && static_cast<std::uint32_t>(others) == grid_ticks_ % 2;
     due[static_cast<std::size_t>(d)] = carries || turn;
     if (!carries) ++others;
   }
