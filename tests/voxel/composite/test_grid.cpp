@@ -205,14 +205,19 @@ int skin_fat_muscle(const Index3& p) {
 int lumps_of_200(const Index3& p) {
   return ((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 2 == 0 ? 200 : 1;
 }
+// A skin and walls one voxel thick, and threads one voxel wide, in soft tissue.
+int thin_parts(const Index3& p) {
+  const bool wall = p[2] == 12 || p[1] == 3, thread = p[0] % 4 == 1 && p[2] % 5 == 2;
+  return wall ? 30 : thread ? 100 : 1;
+}
 int lumps(const Index3& p) {
   return 1 + 4 * (((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 3);
 }
 
 TEST(CompositeGrid, SeveralTissuesAreTheLatticeAtEquilibrium) {
   const Index3 dims{13, 13, 13};
-  for (const auto& tissue :
-       {stiff_soft_stiff, soft_stiff_soft, stiffer_soft_stiffer, lumps, skin_fat_muscle, lumps_of_200}) {
+  for (const auto& tissue : {stiff_soft_stiff, soft_stiff_soft, stiffer_soft_stiffer, lumps, skin_fat_muscle,
+                             lumps_of_200, thin_parts}) {
     for (const double depth : {0.3, 0.7, 0.9}) {
       const Body body(dims, 0.15, everywhere, below, tissue);
       const PressedSquare patch{{6, 6, 12}, 2, depth * 0.15 * 12 * kSpacing};
