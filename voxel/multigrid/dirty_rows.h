@@ -14,7 +14,7 @@ namespace voxel {
 
 class ChangeLog {
  public:
-  // Starts the log, for so many rows on each level; allocates. Before, nothing is noted.
+  // Starts the log. `rows`: number of rows on each level. Allocates. Before this call nothing is noted.
   void begin(std::span<const std::size_t> rows) {
     levels_.clear();
     for (const std::size_t n : rows) levels_.push_back({LazyArray<std::uint8_t>(n), LazyArray<RowId>(n), 0});

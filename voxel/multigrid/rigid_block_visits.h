@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visits of the cells and blocks of a level; for the passes of rigid blocks alone.
+// Loops over the cells and blocks of a level, for the passes of rigid blocks only.
 #pragma once
 
 #include "voxel/multigrid/fas.h"

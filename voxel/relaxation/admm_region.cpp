@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kMost = 4096;  // largest number of moving voxels
 constexpr std::size_t kMostKnown = 8 * kMost;
 constexpr int kDeep = 3;  // layers of neighbours that all belong to the region
-constexpr int kFar = 12;  // all layers; those beyond kDeep follow links at their limits only
+constexpr int kFar = 12;  // all layers; those beyond kDeep follow only links at their limits
 constexpr int kSweeps = 30, kTickSweeps = 6;  // sweeps in a round beside moving bodies; in a tick
 constexpr int kToolSweeps = 100;              // sweeps in a round under the tool, which no tick waits for
 constexpr std::uint64_t kOtherWork = 5;
