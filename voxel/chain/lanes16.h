@@ -22,8 +22,8 @@ using lanes8::required_value;
 constexpr std::size_t kWidth = 16, kVectors = kRow / kWidth;
 using Floats = float __attribute__((vector_size(4 * kWidth)));
 using Masks = __mmask16;
-constexpr Masks kAllLanes =
-    0xFFFF;  // masked forms throughout: GCC 12 warns of its headers for the unmasked ones
+// Intrinsics are used in their masked forms, because GCC 12 warns of its own headers for the unmasked ones.
+constexpr Masks kAllLanes = 0xFFFF;
 
 // Does this processor have AVX-512, and does the system save its registers?
 inline bool has_lanes16() {

@@ -31,7 +31,8 @@ HYBRID_INLINE void store(const Floats& value, float* at) {
 HYBRID_INLINE void broadcast(float value, Floats& out) {
   out = Floats{} + value;
 }
-// out: lanes n − kBy …, n + kBy … of two consecutive vectors; kBy is 0, 1, 2 or 4.
+// Lane n of `out` is lane n − kBy (shift_up_by) or n + kBy (shift_down_by) of two consecutive vectors. kBy is
+// 0, 1, 2 or 4.
 template <std::size_t kBy>
 HYBRID_INLINE void shift_up_by(const Floats& before, const Floats& value, Floats& out) {
   static_assert(kBy < kWidth);
@@ -57,7 +58,7 @@ HYBRID_INLINE bool any_of(const Masks& mask) {
   return (halves[0] | halves[1] | halves[2] | halves[3]) != 0;
 }
 
-// A table of half limits; its first 16 values in registers.
+// A table of half limits. Registers hold its first 16 values.
 struct Table {
   const float* values;
   Floats low, high;
