@@ -27,7 +27,7 @@ constexpr std::uint32_t kDoubles = 0x7fe00009U;
 constexpr std::uint32_t kTransferSyntax = 0x00020010U;
 constexpr std::uint32_t kFrames = 0x00280008U;
 constexpr std::uint32_t kBits = 0x00280100U;
-constexpr std::size_t kMostFrames = 1'000'000;  // a header that says more is broken
+constexpr std::size_t kMostFrames = 1'000'000;  // a header that states more is broken
 
 // One element's header. DICOM PS3.5, chapter 7.
 struct Element {

@@ -11,11 +11,11 @@ namespace voxel {
 
 enum class DicomKind {
   none,
-  without_image,  // a directory, a report
+  without_image,  // such as a directory or a report
   image
 };
 
-// What the elements of a file say about its pixels.
+// Properties of a file's pixels, as its elements state them.
 struct DicomFile {
   DicomKind kind = DicomKind::none;
   std::size_t frames = 1;        // as the header says

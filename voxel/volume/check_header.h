@@ -27,19 +27,19 @@ inline constexpr const char* kDamaged =
 // Largest ratio of unpacked to packed size. Deflate reaches 1,032; the rest is margin.
 inline constexpr double kMostPacked = 1100.0;
 
-// The format by the ending of the name. Throws VolumeError.
+// Selects the format by the ending of the name. Throws VolumeError.
 VolumeFormat format_of(const std::filesystem::path& path);
 
 // Location and encoding of the voxels of a file, and their frame.
 struct VoxelPlace {
   enum class Packing { raw, text, deflate, other };
   std::filesystem::path file;    // the header's own file, or a file beside it
-  std::uint64_t file_bytes = 0;  // of `file`
+  std::uint64_t file_bytes = 0;  // size of `file`
   std::uint64_t offset = 0;      // bytes in `file` before the voxels (raw) or before the packed stream
   std::uint64_t skipped = 0;     // bytes of the unpacked stream before the voxels
   Packing packing = Packing::raw;
   bool swapped = false;                 // byte order differs from this machine's
-  bool as_they_are = true;              // false: voxels that only the format's library finds
+  bool as_they_are = true;              // false: only the format's library finds the voxels
   double slope = 1.0, intercept = 0.0;  // intensity = slope · stored number + intercept
   // Component type of the voxels, as the NIfTI or NRRD header states it. A MetaImage header is read by its
   // library, which sets the type and the frame.

@@ -96,7 +96,7 @@ class FrameElements {
 };
 
 void open_dicom(const fs::path& path, gdcm::ImageReader& reader) {
-  gdcm::ImageHelper::SetForceRescaleInterceptSlope(true);  // for every kind of image that states them
+  gdcm::ImageHelper::SetForceRescaleInterceptSlope(true);  // reads both from every kind of image
   reader.SetFileName(path.c_str());
   if (!reader.Read())
     refuse_volume(path, "the slice cannot be read: the DICOM library does not understand its image; ",

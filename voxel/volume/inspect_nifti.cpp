@@ -118,7 +118,7 @@ Component nifti_component(const fs::path& path, const NiftiHeader& header) {
                 ", where one whole or real number is needed; save one channel of it");
 }
 
-// Sizes and voxel sizes of the first three axes.
+// Reads the number of voxels and the voxel size along the first three axes.
 void read_nifti_axes(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
   const int axes = header.at<std::int16_t>(40);
   check_axes(path, axes);
@@ -187,7 +187,7 @@ NiftiAffine affine_of_sform(const NiftiHeader& header) {
 
 // Are the steps at right angles, and as long as the header's voxel sizes?
 bool is_rectangular(const NiftiAffine& affine, const glm::dvec3& spacing, std::size_t axes) {
-  constexpr double kStepRounding = 1e-3;  // of a voxel; headers hold single precision
+  constexpr double kStepRounding = 1e-3;  // relative; headers hold single precision
   for (int a = 0; a < static_cast<int>(axes); ++a) {
     const double length = glm::length(affine.steps[a]);
     if (!(std::abs(length - spacing[a]) <= kStepRounding * spacing[a])) return false;

@@ -24,7 +24,7 @@ template <typename... Parts>
   refuse_volume(path, "the header cannot be read: ", parts..., "; ", kDamaged);
 }
 
-// Words between blanks. A word in quotes or in round brackets may hold blanks; the quotes are dropped.
+// Splits a text at blanks. A word in quotes or in round brackets may hold blanks; the quotes are dropped.
 std::vector<std::string> words_between_blanks(const std::string& text) {
   std::vector<std::string> words;
   std::string word;
@@ -52,7 +52,7 @@ std::vector<std::string> words_between_blanks(const std::string& text) {
   return words;
 }
 
-// The numbers of "(1,0,0)". Throws VolumeError.
+// The numbers of a vector such as "(1,0,0)". Throws VolumeError.
 std::vector<double> vector_of(const fs::path& path, const std::string& key, const std::string& word) {
   std::vector<double> values;
   const char* at = word.c_str() + 1;
@@ -283,7 +283,7 @@ void read_oriented_frame(const fs::path& path, const TextHeader& header, const s
   if (places.size() < 3) complete_axes(place.frame, places.size());
 }
 
-// Axes by spacings alone: nothing says where they point.
+// Reads axes for which the header gives spacings alone and no directions.
 void read_plain_frame(const fs::path& path, const TextHeader& header, const std::vector<std::size_t>& places,
                       VoxelPlace& place) {
   const std::vector<std::string> spacings = words_between_blanks(header.text("spacings")),

@@ -138,7 +138,7 @@ class Thinner {
     }
   }
 
-  // Are all voxels within the shell's thickness, corners included, stiff?
+  // True if all voxels within the shell's thickness are stiff, corners included.
   [[nodiscard]] bool is_inside(int i, int j, int k) {
     const int s = options_.shell;
     const std::array<int, 3>& n = volume().dims;

@@ -12,7 +12,7 @@ namespace voxel {
 // not matter. Empty if the word is no such unit.
 std::optional<double> length_unit_m(const std::string& word);
 
-// "mm", or "0.0254 m" for a unit without a metric name.
+// The unit as text, such as "mm". A unit without a metric name gives "0.0254 m".
 std::string unit_in_words(double unit_m);
 
 }  // namespace voxel

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A volume in its file's component type, between reading and labelling. Internal to the readers
-// (read_volume.h); independent of ITK and of file formats. Checks frames, memory and options; labels and
-// resamples the voxels.
+// (read_volume.h); independent of ITK and of file formats. The functions check frames, memory and options.
+// They label and resample the voxels.
 #pragma once
 
 #include <cstddef>

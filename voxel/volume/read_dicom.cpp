@@ -73,7 +73,7 @@ void for_each_apart(const fs::path& folder, const std::vector<fs::path>& files, 
   }
 }
 
-// The regular files of a folder, by name.
+// The regular files of a folder, sorted by name.
 std::vector<fs::path> files_of(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
