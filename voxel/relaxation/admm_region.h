@@ -40,10 +40,10 @@ class AdmmRegion {
   void prepare_lists();
 
   // Relaxes a region: voxels that active limits hold or that are in `on_body`, and their neighbourhood, which
-  // extends further along links at their limits. If `on_body` is empty, the last one that was not is used
-  // again, with more sweeps. All multipliers are dropped if no link is at its limit, or if a voxel is
-  // squeezed into an obstacle, which no multiplier balances. `briefly` halves the sweeps, for tissue that is
-  // still moving. Returns the largest force that moved a voxel (N).
+  // extends further along links at their limits. If `on_body` is empty, the last non-empty one is used again,
+  // with more sweeps. All multipliers are dropped if no link is at its limit, or if a voxel is squeezed into
+  // an obstacle, which no multiplier balances. `briefly` halves the sweeps, for tissue that is still moving.
+  // Returns the largest force that moved a voxel (N).
   double relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                std::span<const VoxelId> on_body, bool briefly = false) noexcept;
   // Was any link of the region at its limit in the last relax()?
@@ -114,8 +114,8 @@ class AdmmRegion {
   // Kept from call to call.
   LazyVector<VoxelId> known_;
   LazyArray<std::uint32_t> asked_;  // [v] number of the last call that used its multipliers; 0: none is kept
-  std::array<LazyArray<float>, 9>
-      beyond_;  // [3 axis + d][v] scaled multiplier of the link to the voxel above (m)
+  // [3 axis + d][v] scaled multiplier of the link to the voxel above (m)
+  std::array<LazyArray<float>, 9> beyond_;
   std::array<LazyArray<float>, 3> pressed_;  // [axis][v] force of the obstacle (N)
   std::uint32_t calls_ = 0;
   std::uint64_t looked_at_ = 0;

@@ -68,24 +68,27 @@ class Relaxation {
   // Ends a cycle that is under way; pending corrections wait for the next one.
   void end_contact() noexcept { step_ = plane_ = 0; }
 
-  // A cycle on boxes large enough for tissue that has to move by spacings; for a thread with time for it.
-  // Active limits are released first, because during such motion other limits are active in each cycle.
-  // `coarse_first`, after a jump: coarse levels are relaxed to rest among themselves, and their correction is
-  // then prolonged to all voxels of the boxes at once. Returns Float8 visited.
+  // A cycle on boxes that are large enough for tissue that has to move by whole spacings. Only for a thread
+  // that has time for it. Active limits are released first, because during such motion other limits are
+  // active in each cycle. `coarse_first`, after a jump: coarse levels are relaxed to rest among themselves,
+  // and their correction is then prolonged to all voxels of the boxes at once. Returns the number of Float8
+  // visited.
   std::size_t relax_large_patch(Displacement& state, const ObstacleView& obstacles,
                                 std::span<const VoxelId> held, std::span<const VoxelId> pressed,
                                 bool coarse_first) noexcept;
-  // Prolongs pending corrections around such boxes, and no more. Returns Float8 prolonged.
+  // Prolongs pending corrections in those boxes and around them, and does nothing else. Returns the number of
+  // Float8 prolonged.
   std::size_t prolong_large_patch(Displacement& state, const ObstacleView& obstacles,
                                   std::span<const VoxelId> pressed) noexcept;
   // A cycle over the whole object, coarse levels first. Voxels get the correction last and are not smoothed:
-  // call relax_around_blocks() after it. Returns Float8 visited.
+  // call relax_around_blocks() after it. Returns the number of Float8 visited.
   std::size_t run_whole_coarse_first(Displacement& state, const ObstacleView& obstacles,
                                      std::span<const VoxelId> held) noexcept;
   // Relaxes voxels that limits hold under the tool (AdmmRegion). Call it after cycles that do not end a
   // round.
   void relax_region(Displacement& state, const ObstacleView& obstacles) noexcept;
-  // A cycle around each rigid block that the tool presses: the force depends on the springs all around it.
+  // Runs a cycle around each rigid block that the tool presses, because the force depends on the springs all
+  // around the block.
   void relax_around_blocks(Displacement& state, const ObstacleView& obstacles) noexcept;
 
   [[nodiscard]] LevelStiffness& couplings() { return multigrid_.couplings(); }
@@ -103,7 +106,7 @@ class Relaxation {
   [[nodiscard]] const AdmmRegion& region() const { return *region_; }
   // True if a link was at its limit in the last region that was relaxed under the tool or beside a body.
   [[nodiscard]] bool at_limits() const noexcept;
-  // Something moved: relaxes until the residual is below the tolerance again.
+  // Call when something moved: relaxation goes on until the residual is below the tolerance again.
   void wake() noexcept {
     asleep_ = false;
     cycles_without_gain_ = 0;
@@ -146,8 +149,8 @@ class Relaxation {
     }
   };
   [[nodiscard]] const NearRows& near_contact() const { return near_; }
-  // Largest force on any free voxel (N), as the last round found it. If it is below the tolerance, only that
-  // is certain.
+  // Largest force on any free voxel (N), as the last round found it. Below the tolerance its exact value is
+  // unknown.
   [[nodiscard]] double residual_N() const { return residual_N_; }
   // Relaxation stops when the residual falls below this (N), or has not fallen for a while: under active
   // limits a residual remains that no relaxation removes. Default: half of kRestingResidual of the lattice's
@@ -157,7 +160,7 @@ class Relaxation {
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   void prepare_all() noexcept { multigrid_.prepare_all(); }
   void prepare_beside_bodies();  // call if obstacles will move
-  void prepare_under_tool();     // for whole rounds, which a shadow runs
+  void prepare_under_tool();     // call for a shadow, whose rounds relax under the tool
   // Copies the state of `other`, which has the same lattice.
   void copy_from(const Relaxation& other) noexcept;
   // Restricts all coarse cells anew, after copy_from(): `other` was left to a shadow and has hardly any
@@ -257,10 +260,10 @@ class Relaxation {
   std::unique_ptr<AdmmRegion> region_;
   std::vector<LevelBoxes> boxes_;
   std::array<std::vector<Step>, 2> steps_;  // [Visits]
-  Visits visits_ = Visits::once;            // of the cycle whose boxes are laid
+  Visits visits_ = Visits::once;            // visits of the cycle whose boxes are laid
   LazyVector<VoxelId> standing_;            // voxels held on all axes in the last cycle
   bool tool_presses_ = false;               // the tool presses voxels
-  bool patient_ = false;                    // rounds do not run in a tick
+  bool patient_ = false;                    // rounds may take longer than a tick
   std::int64_t credit_ = 0;                 // voxel updates left; negative: overspent
   std::size_t round_left_ = 0;              // tiles left in this round
   // Search for tiles with a pending correction above them: the next tile, and tiles searched in vain.

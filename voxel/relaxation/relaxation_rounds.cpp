@@ -11,7 +11,7 @@ namespace voxel {
 
 namespace {
 
-constexpr std::uint64_t kLetGoEvery = 8;  // rounds between two releases of active limits
+constexpr std::uint64_t kLetGoEvery = 8;  // without gain, active limits are released once in this many rounds
 constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
@@ -100,7 +100,7 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
   return most_N;
 }
 
-// The end of a round over all that moves: is the object at rest?
+// Ends a round over everything that moves, and decides whether the object is at rest.
 void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept {
   residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().unbalanced_N()));
   // Clusters move only when little else does. Between other corrections their steps would undo one another
