@@ -57,8 +57,8 @@ class BoundarySprings {
   [[nodiscard]] const float* hold(int level, RowId row, std::size_t axis) const {
     return at(level).hold[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
-  // [lane] A cell takes 1 / (1 + this) of a prolonged correction, because it is nearer to the fixed place
-  // than the middle of the coarser cell is.
+  // [lane] A cell takes the part 1 / (1 + nearer) of a prolonged correction, because it is nearer to the
+  // fixed place than the middle of the coarser cell is.
   [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
     return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
@@ -75,7 +75,7 @@ class BoundarySprings {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links in d (N/m)
+  using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links along d (N/m)
   // Springs of anchors are found when their row is first asked for, because all of them would take much
   // memory. On coarse levels finding them takes long: there they are found on construction and stored without
   // zeros.
@@ -100,7 +100,7 @@ class BoundarySprings {
   };
   static constexpr std::uint8_t kWaits = 0x80;
 
-  struct Found {  // of one cell; as in Level
+  struct Found {  // springs of one cell; members as in Level
     Through through{};
     std::array<float, 3> hold{}, nearer{}, tilt{};
   };
@@ -109,7 +109,7 @@ class BoundarySprings {
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] Support support_of(VoxelId v) const noexcept {
-    // The row is asked first: reading supported_ may take memory.
+    // The row is checked first, because reading supported_ may take memory.
     if ((!held_.empty() && held_mark_[v] != 0) || lattice_.anchored(v)) return kAll;
     return supports(v / kRow) ? supported_[v] : Support{};
   }

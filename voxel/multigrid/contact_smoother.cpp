@@ -26,8 +26,8 @@ std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
   for (std::size_t n = 0; n < kRow; n += 8) {
     std::uint64_t roles;
     std::memcpy(&roles, state.role.data() + static_cast<std::size_t>(row) * kRow + n, sizeof roles);
-    // A byte of `other` is 0 if its lane has that role. Then the byte of `is` is 0x80, else 0. The product
-    // gathers these bits in one byte.
+    // A byte of `other` is 0 if its lane has the role `obstacle`. Then the byte of `is` is 0x80, else 0. The
+    // product gathers these bits in one byte.
     const std::uint64_t other = roles ^ (Displacement::obstacle * kOnes);
     const std::uint64_t is = ~(((other & kLow) + kLow) | other) & ~kLow;
     lanes |= static_cast<std::uint32_t>((is >> 7U) * 0x0102040810204080U >> 56U) << n;
@@ -35,7 +35,7 @@ std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
   return lanes;
 }
 
-// `visit(v, lane)` for the lanes whose bits are set, in order.
+// Calls visit(v, lane) for the lanes whose bits are set, in order.
 template <class Visit>
 void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
   for (; lanes != 0; lanes &= lanes - 1) {
@@ -44,7 +44,7 @@ void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
   }
 }
 
-// `visit(v, lane)` for the pressed voxels of a row in the Float8 of a span.
+// Calls visit(v, lane) for the pressed voxels of a row in the Float8 of a span.
 template <class Visit>
 void for_pressed(const Displacement& state, RowId row, LaneSpan span, const Visit& visit) {
   if (state.row_standing[row] == 0) return;

@@ -88,7 +88,7 @@ class Multigrid {
   // Sets the force of active limits on a voxel (N), until it is set again. The force balances that of the
   // springs, and the cells above the voxel do not move.
   void set_limit_load(VoxelId v, const glm::vec3& force_N) noexcept;
-  // Active limits of voxels: `visit(v, axis)` for each axis on which a limit holds v.
+  // Calls visit(v, axis) for each axis on which an active limit holds voxel v.
   template <class Visit>
   void for_active(const Visit& visit) const {
     for (const StoppedCell& s : stopped_) {
@@ -166,8 +166,9 @@ class Multigrid {
   [[nodiscard]] bool tool_presses_block(std::size_t block) const {
     return block_state_[block].by_tool.count > 0;
   }
-  // Force of springs and loads on a block (N), and its frozen residual.
+  // Force of springs and loads on a block (N).
   [[nodiscard]] glm::dvec3 block_force(std::size_t block, const Displacement& state) const noexcept;
+  // Load that freezes the residual of a block (N): its force when it was frozen, negated.
   [[nodiscard]] glm::dvec3 residual_of_block(std::size_t block) const noexcept {
     return block_state_[block].frozen_N;
   }
@@ -189,8 +190,9 @@ class Multigrid {
   void smooth_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                      const ObstacleView& obstacles) noexcept;
   // measure_blocks() finds the residuals of the blocks; call it before the coarser level's loads are
-  // restricted. load_blocks() finds the blocks' own loads on the coarser level; call it afterwards. Returns
-  // the largest residual over the root of the number of border links (N), for level 0 only.
+  // restricted. load_blocks() finds the blocks' own loads on the coarser level; call it afterwards. For level
+  // 0, measure_blocks() returns the largest residual of a block, divided by the root of its number of border
+  // links (N).
   float measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                        const ObstacleView& obstacles) noexcept;
   void load_blocks(int level, const RigidBlocks::Box& box) noexcept;
@@ -230,12 +232,12 @@ class Multigrid {
   // Adds motion that another solver found to a row, as far as its links allow.
   void add_motion(RowId row, const RowVector& way, Displacement& state,
                   const ObstacleView& obstacles) noexcept;
-  // The same for many rows together: each goes as far as its links to the others' new places allow. A row is
-  // added once. If can_batch() is false (obstacles nearby, or too many rows) use add_motion().
+  // The same for many rows together: each goes as far as its links to the others' new places allow. Add each
+  // row once. If can_batch() is false (obstacles nearby, or too many rows), use add_motion().
   [[nodiscard]] bool can_batch(RowId row, const Displacement& state) noexcept {
     return prepare(0, row) && state.row_obstacles[row] == 0 && !limited_correction_.full();
   }
-  // `fill(way)` writes the row's motion.
+  // Adds a row to the batch; `fill(way)` writes its motion.
   template <class Fill>
   void batch(RowId row, Displacement& state, const Fill& fill) noexcept {
     LimitedCorrection::Row& r = limited_correction_.add(row, {});
@@ -330,7 +332,7 @@ class Multigrid {
                    RowVector& left) const noexcept;
   void take_back_refused(int level, const Refused& refused) noexcept;
 
-  // ---- where something is touched (contact_smoother.cpp) ----
+  // ---- contacts (contact_smoother.cpp) ----
   float smooth_voxels(const LevelRow& r, RowId row, Displacement& state, const ObstacleView& obstacles,
                       LaneSpan span) noexcept;
   RowCorrection correct_voxels(const LevelRow& r, RowId row, const RowVector& correction, Displacement& state,

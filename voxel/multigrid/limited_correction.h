@@ -24,7 +24,7 @@ namespace voxel {
 
 class LimitedCorrection {
  public:
-  static constexpr std::size_t kMost = 65536;  // rows at a time
+  static constexpr std::size_t kMost = 65536;  // most rows at a time
 
   struct Row {
     RowId row = 0;
@@ -32,8 +32,8 @@ class LimitedCorrection {
     float most_m = 0.0F;  // largest motion asked of it
     bool asked = false;   // it is queued
     bool out = false;     // it has moved
-    bool cut = false;     // voxels that do not move were asked to
-    bool aims = false;    // its target is stored, because it may miss it
+    bool cut = false;     // voxels that do not move were asked to move
+    bool aims = false;    // its target is stored, because the row may miss it
     RowVector from;       // where it was; before it has moved, its motion (m)
   };
 
@@ -49,8 +49,8 @@ class LimitedCorrection {
     ring_.populate(std::min(some, ring_.size()), {true});
     number_.populate();
   }
-  // Adds a row, once, unless full(). The caller writes its motion to `from`; lanes outside of the span do not
-  // move.
+  // Adds a row that was not added yet. Call only if not full(). The caller writes its motion to `from`; lanes
+  // outside of the span do not move.
   Row& add(RowId row, LaneSpan span) noexcept;
   void clear() noexcept;
   // Target of a row (m); kept for rows that did not reach it.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inner loops of a limited correction on one row (limited_correction.h), by Float8, as row_smoother.cpp.
+// Inner loops of a limited correction on one row (limited_correction.h), in Float8, as in row_smoother.cpp.
 #include "voxel/lattice/simd_dispatch.h"
 #include "voxel/multigrid/row_limits.h"
 #include "voxel/multigrid/row_smoother.h"

@@ -19,7 +19,7 @@ namespace voxel {
 class Prolongation {
  public:
   Prolongation() = default;
-  // For any box of `fine`, the grid of the finer of two levels.
+  // Serves any box of `fine`, the grid of the finer of two levels. Allocates.
   explicit Prolongation(const Grid& fine);
 
   [[nodiscard]] std::size_t memory_bytes() const {

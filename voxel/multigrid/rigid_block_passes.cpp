@@ -27,8 +27,8 @@ std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state,
              apart = std::max(0.0, static_cast<double>(bounds[1] - difference));
   return l.up ? std::array<double, 2>{apart, closer} : std::array<double, 2>{closer, apart};
 }
-// How much further it may move if voxel v at the link's other end comes along as far as v's other links
-// allow.
+// How much further the block's voxel may move if voxel v at the link's other end comes along as far as v's
+// other links allow.
 double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v, std::uint16_t block,
                    int axis, bool upwards) {
   if (state.role[v] != Displacement::free || lattice.anchored(v)) return 0.0;
@@ -252,6 +252,7 @@ void Multigrid::shift_cells(int level, std::size_t block, const glm::dvec3& way)
 }
 
 // Force and stiffness of a block on a level: springs of its border, boundary springs of its cells, its load.
+// On level 0 the force is only the load that freezes the block's residual.
 glm::dvec3 Multigrid::block_pull(int level, std::size_t block, glm::dvec3& stiffness) noexcept {
   const RigidBlocks::OnLevel& on = blocks_->on(level, block);
   stiffness = on.stiffness;

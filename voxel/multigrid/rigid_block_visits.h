@@ -6,7 +6,7 @@
 
 namespace voxel {
 
-// `visit(cell, lane)` for the cells of a block in a run.
+// Calls visit(cell, lane) for the cells of a block in a run.
 template <class Visit>
 void for_cells(const RigidBlocks::Run& run, const Visit& visit) {
   for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1) {

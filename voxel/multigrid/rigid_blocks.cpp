@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which voxels and cells form a rigid block on each level, and its border; motion of a block within bounds.
+// Voxels and cells of a rigid block on each level, and its border; motion of a block within bounds.
 #include "voxel/multigrid/rigid_blocks.h"
 
 #include <algorithm>

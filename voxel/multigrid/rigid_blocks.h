@@ -104,7 +104,7 @@ class RigidBlocks {
   }
   // Is the block fixed for coarse levels that do not know it?
   [[nodiscard]] bool sprawls(std::size_t block) const { return sprawls_[block] != 0; }
-  // Voxels of the block with loads besides their springs: bricks, or plastic links, of tissue beside it.
+  // Voxels of the block with loads besides their springs: from bricks or plastic links of tissue beside it.
   [[nodiscard]] const std::vector<VoxelId>& loaded(std::size_t block) const { return loaded_[block]; }
   // Surface numbers of its surface voxels.
   [[nodiscard]] const std::vector<std::uint32_t>& surface(std::size_t block) const { return surface_[block]; }

@@ -27,7 +27,7 @@ constexpr bool clamps(Limits l) {
   return l != Limits::none;
 }
 
-// Limits of one axis of a row. If each lane has its own, these are arrays for the links up and down, by d.
+// Limits of one axis of a row. If each lane has its own, the arrays hold them by d for the links up and down.
 struct AxisBounds {
   AxisLimits row;
   std::array<const float*, 3> up_low{}, up_high{}, down_low{}, down_high{};

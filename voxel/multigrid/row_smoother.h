@@ -119,7 +119,7 @@ enum Side : unsigned { kYDown = 1, kYUp = 2, kZDown = 4, kZUp = 8, kXDown = 16, 
 
 struct SetOut {
   float most_m = 0.0F;  // largest motion asked of a voxel
-  bool cut = false;     // a voxel that does not move was asked to
+  bool cut = false;     // a voxel that does not move was asked to move
   bool beyond = false;  // links in the row, or to one of its `sides`, may be beyond their limits
   // bits of the axes on which an active limit (row.stopped) holds a voxel that was asked to move
   unsigned stopped = 0;
