@@ -54,7 +54,7 @@ class ThesisChainMail {
 
   // Moves the sources by `moves` (m), and the chain after them. Anchored elements stay and sponsor no
   // candidates. The queue may grow, and so allocate. Incompatible sources would push one another endlessly:
-  // after kMaxRounds times as many candidates as there are links the rest is dropped, and gave_up() is true.
+  // after kMaxRounds candidates per cell and direction the rest is dropped, and gave_up() is true.
   void move(std::span<const ElementId> sources, std::span<const glm::vec3> moves);
   // Of the last move().
   [[nodiscard]] std::uint64_t candidates() const { return candidates_; }

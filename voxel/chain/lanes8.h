@@ -11,13 +11,13 @@
 #include "voxel/chain/row_kernels.h"
 #include "voxel/lattice/row_grid.h"
 
-// Inlined into the functions of every width, whatever their size.
+// These functions are inlined into the functions of every width, whatever their size.
 #define HYBRID_INLINE inline __attribute__((always_inline))
 
 namespace voxel::lanes8 {
 
-// Explicit vectors: from plain loops the compiler generates neither table look-ups in registers nor the test
-// whether any lane moves. Where registers are narrower, it splits these vectors.
+// Vectors are explicit, because from plain loops the compiler generates neither table look-ups in registers
+// nor the test whether any lane moves. Where registers are narrower, it splits these vectors.
 constexpr std::size_t kWidth = 8, kVectors = kRow / kWidth;
 using Floats = float __attribute__((vector_size(4 * kWidth)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kWidth)));

@@ -22,7 +22,8 @@ inline constexpr float kUnbounded = 1e30F;
 // Half limits by label; see ChainLimits.
 struct HalfLimits {
   const float* table;
-  int registers;  // of 8 floats, for the values up to the largest label in use: 1, 2, or 0 for more
+  int registers;  // registers of 8 floats that hold the table up to the largest label in use: 1, 2, or 0 for
+                  // more
 };
 
 // Bits: some voxel of the row moved; its first one moved; its last one moved.

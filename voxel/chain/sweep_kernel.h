@@ -18,7 +18,7 @@ inline constexpr std::uint32_t kFullRow = 0xFFFFFFFFU;  // RowInfo::free of a ro
 // rows.
 struct RowInfo {
   std::uint32_t free = 0;     // bit of each lane: a voxel that is not anchored
-  std::uint8_t label = 0;     // of a row full of free voxels of one label; else 0
+  std::uint8_t label = 0;     // label of a row that is full of free voxels of one label; else 0
   bool filled : 1 = false;    // has any voxel
   bool anchored : 1 = false;  // has any anchor
   bool known : 1 = false;     // the fields above are set

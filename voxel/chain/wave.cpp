@@ -8,7 +8,7 @@ namespace voxel {
 namespace {
 
 constexpr std::size_t kPrefetchRows = 12;
-constexpr std::size_t kMaxCones = 4;  // sources that are spread by a cone each; more by one sweep
+constexpr std::size_t kMaxCones = 4;  // up to this many sources get a cone each; more get one sweep
 
 }  // namespace
 
@@ -147,7 +147,7 @@ void ChainWave::relax_beside(const WaveArgs& p, RowId row, RowId to, int directi
   enqueue(to, moves & (first | last));
 }
 
-// In a row with anchors: moves the free voxels to `required`. Anchors that it would move are pulled.
+// Moves the free voxels of a row with anchors to `required`. Anchors that would have to move are pulled.
 Moved ChainWave::move_free(const WaveArgs& p, RowId row, const float* required) noexcept {
   float* const u = row_at(p, row);
   const std::uint32_t free = info(row).free;
@@ -208,7 +208,7 @@ Moved ChainWave::relax_within_by_label(const WaveArgs& p, RowId row, float* u) n
 
 void ChainWave::relax_neighbours(const WaveArgs& p, RowId row) noexcept {
   const Grid& grid = lattice_.grid();
-  // Cleared first, because a row with anchors may enqueue itself again.
+  // The marks are cleared first, because a row with anchors may enqueue itself again.
   std::uint8_t ends = rows_[row].mark & (first | last);
   rows_[row].mark &= static_cast<std::uint8_t>(~(queued | first | last));
   ends |= relax_within(p, row);

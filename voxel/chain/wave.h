@@ -60,8 +60,8 @@ class ChainWave {
   // `way`.
   std::uint64_t spread_from_pulled(float* u, int axis, Way way, float margin,
                                    std::uint64_t most = kUnlimited) noexcept;
-  // To continue with the waiting rows: take_waiting(), one wave for each axis and direction, then put_back()
-  // of the rows that these left.
+  // To continue with the waiting rows, call take_waiting(), then one wave for each axis and direction, then
+  // put_back() for the rows that these left.
   void take_waiting() noexcept;
   std::uint64_t spread_from_taken(float* u, int axis, Way way, float margin,
                                   std::uint64_t most = kUnlimited) noexcept;
@@ -77,7 +77,7 @@ class ChainWave {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr std::uint64_t kConeRows = 8;  // rows of a cone take about as long as one row update
+  static constexpr std::uint64_t kConeRows = 8;  // this many rows of a cone take as long as one row update
   // first, last: the first or the last voxel of the row has moved since the row was last visited.
   enum Mark : std::uint8_t { first = kFirstMoved, last = kLastMoved, queued = 8 };
   struct WaveArgs {
@@ -127,8 +127,8 @@ class ChainWave {
   [[nodiscard]] float* row_at(const WaveArgs& p, RowId row) const noexcept {
     return p.u + static_cast<std::size_t>(row) * kRow;
   }
-  // Looked up at the first use, to save memory. All rows of a line in y are looked up together, so that the
-  // RowInfo of a row's neighbours in y is known if its own is.
+  // A RowInfo is looked up at its first use, to save memory. All rows of a line in y are looked up together,
+  // so that the RowInfo of a row's neighbours in y is known if its own is.
   [[nodiscard]] const RowInfo& info(RowId row) noexcept {
     if (!rows_[row].known) look_up(row);
     return rows_[row];
