@@ -159,7 +159,7 @@ void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std:
   }
   find_all();
   // A source may lie beside a dependent of another source. Its row is looked at, too, so that dependents()
-  // counts the link between both as one among dependents.
+  // does not take the link between both for a link to others.
   for (const VoxelId v : sources) {
     if (rows_.empty()) break;
     if (find(v / kRow) != nullptr) continue;
