@@ -94,8 +94,8 @@ HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& 
   take_least(wanted, in.high);
   wanted = in.low > in.high ? now : wanted;
 }
-// [d] A link whose difference is below this needs no check of its limits. It is a little less than the
-// tightest limit of the row allows.
+// [d] Bound of the difference across a link, a little below the tightest limit of the row. Below it the
+// limits of the link need no check.
 struct Band {
   std::array<float, 3> most;
 
