@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`; sessions do not use it.
 //
-// ChainMail by a first-come queue of candidates with their sponsors (Figs 6 to 9), contact by a point and six
-// directions on a dense occupancy map (Fig 16), a force from the lines of links through the touched element
-// (getForce), and a relaxation in which each element moves as its links require, damped or not. The
-// implementation is efficient: dense arrays, 16 bytes per element, a queue that stops allocating once it has
-// grown. In two respects it differs from the thesis, so that neither rounding nor units count against it: it
-// stores displacements from rest instead of absolute positions, and its springs have the moduli of `Lattice`.
-// (Springs on a border are whole ones, as in the thesis; `Lattice` halves them.)
+// Its parts are ChainMail by a first-come queue of candidates with their sponsors (Figs 6 to 9), contact by a
+// point and six directions on a dense occupancy map (Fig 16), a force from the lines of links through the
+// touched element (getForce), and a relaxation in which each element moves as its links require, damped or
+// not. The implementation is efficient: dense arrays, 16 bytes per element, a queue that stops allocating
+// once it has grown. In two respects it differs from the thesis, so that neither rounding nor units count
+// against it: it stores displacements from rest instead of absolute positions, and its springs have the
+// moduli of `Lattice`. (Springs on a border are whole ones, as in the thesis; `Lattice` halves them.)
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ struct ThesisChainMailOptions {
   // 22).
   enum class Movement : std::uint8_t { mean, sum } movement = Movement::mean;
   double damping = 1.0;    // factor on that movement; 1: undamped. The thesis's remedy is "some small value"
-  bool six_points = true;  // else the tool is a point (the thesis before Figs 20 and 21)
+  bool six_points = true;  // false: the tool is a point (the thesis before Figs 20 and 21)
   bool lock = false;       // locks the object for each element that is visited (Fig 23)
 };
 
@@ -36,12 +36,12 @@ class ThesisChainMail {
  public:
   using ElementId = std::uint32_t;  // index into a grid with a border of one
 
-  // Throws std::invalid_argument if the number of labels does not fit the volume's size, or if it has 2^29
-  // cells or more. Materials are not checked (Lattice checks them).
+  // Throws std::invalid_argument if the number of labels does not fit the volume's size, or if the volume
+  // with its border has 2^29 cells or more. Materials are not checked (Lattice checks them).
   ThesisChainMail(const LabelVolume& volume, const LatticeOptions& options,
                   const ThesisChainMailOptions& classic = {});
 
-  [[nodiscard]] ElementId at(int i, int j, int k) const;  // voxel of the volume
+  [[nodiscard]] ElementId at(int i, int j, int k) const;  // element of voxel (i, j, k) of the volume
   [[nodiscard]] bool filled(ElementId v) const { return (elements_[v].info & kFilled) != 0; }
   [[nodiscard]] bool anchored(ElementId v) const { return (elements_[v].info & kAnchored) != 0; }
   [[nodiscard]] glm::vec3 displacement(ElementId v) const {  // (unit: meter)
@@ -54,16 +54,16 @@ class ThesisChainMail {
 
   // Moves the sources by `moves` (m), and the chain after them. Anchored elements stay and sponsor no
   // candidates. The queue may grow, and so allocate. Incompatible sources would push one another endlessly:
-  // after kMaxRounds times as many candidates as there are links the rest is dropped, and gave_up() is true.
+  // after kMaxRounds candidates per cell and direction the rest is dropped, and gave_up() is true.
   void move(std::span<const ElementId> sources, std::span<const glm::vec3> moves);
   // Of the last move().
   [[nodiscard]] std::uint64_t candidates() const { return candidates_; }
   [[nodiscard]] bool gave_up() const { return gave_up_; }
   static constexpr std::uint64_t kMaxRounds = 20;
 
-  // One round of the haptic thread (Fig 16), volume frame (m). Looks up the tool's centre, then six points at
-  // `radius` from it. The first point that finds an element moves it, or a nearer element linked to it, to
-  // that point. The other points are ignored.
+  // One round of the haptic thread (Fig 16); lengths in m in the volume frame. Looks up the tool's centre,
+  // then six points at `radius` from it. The first point that finds an element moves it, or a nearer element
+  // linked to it, to that point. The other points are ignored.
   struct Touch {
     bool contact = false;
     ElementId element = 0;
@@ -107,7 +107,8 @@ class ThesisChainMail {
   [[nodiscard]] std::array<float, 3> relaxed(ElementId v) const;
   void set(ElementId v, const std::array<float, 3>& u);
   void make_map();
-  [[nodiscard]] std::size_t cell_of(const glm::dvec3& position) const;  // the map's size: outside of it
+  // Returns the map's size if the position is outside of the map.
+  [[nodiscard]] std::size_t cell_of(const glm::dvec3& position) const;
   void enter_in_map(ElementId v);
   void leave_map(ElementId v);
   // The element in the point's cell, or one in a neighbouring cell within half a spacing of the point on each
@@ -121,12 +122,12 @@ class ThesisChainMail {
   std::size_t classes_ = 1;
   std::vector<Element> elements_;
   std::vector<Limits> limits_;                 // [direction][class of sponsor][class of candidate]
-  std::vector<std::array<float, 3>> springs_;  // the same: stiffness on each axis (N/m)
+  std::vector<std::array<float, 3>> springs_;  // [as limits_] stiffness on each axis (N/m)
   std::vector<ElementId> surface_;
   std::vector<std::uint32_t> queue_;  // ring buffer: candidate · 8 + direction from its sponsor
   std::size_t head_ = 0, tail_ = 0;
   std::vector<ElementId> map_;                 // [cell] an element in it; empty until the first touch()
-  std::vector<std::array<float, 3>> relaxed_;  // of relax_all()
+  std::vector<std::array<float, 3>> relaxed_;  // results of relax_all()
   ElementId next_ = 0;
   std::uint64_t candidates_ = 0;
   bool gave_up_ = false;

@@ -5,9 +5,9 @@
 // are independent. After the sources have moved, the new state is clamp(u, L, U) with L(v) = max over sources
 // s of u(s) − dist(v→s) and U(v) = min over sources s of u(s) + dist(s→v). dist is the shortest path in a
 // graph with an arc a→b of length hi and an arc b→a of length −lo for each link. The new state violates no
-// link if the old one violated none. One wave raises and one lowers (wave.h); then two waves each for voxels
-// stopped by obstacles and for anchors. A first-come queue (Gibson 1997) gives a different result; Schill's
-// order of violation (1998) is Dijkstra's algorithm on these paths.
+// link if the old one violated none. One wave raises and one lowers (wave.h). Two more waves follow for
+// voxels that obstacles stopped, and two for anchors. A first-come queue (Gibson 1997) gives a different
+// result. Schill's order of violation (1998) is Dijkstra's algorithm on these paths.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ class ChainMail {
  public:
   explicit ChainMail(const Lattice& lattice);
 
-  // Looks up now what waves need of the lattice; else it is looked up at the first use.
+  // Looks up the lattice data of waves now. Otherwise they are looked up at the first use.
   void prepare_all() noexcept { wave_.prepare_all(); }
 
   static constexpr std::uint64_t kUnlimited = ChainWave::kUnlimited;
@@ -77,7 +77,7 @@ class ChainMail {
   const Lattice& lattice_;
   ChainWave wave_;
   std::uint64_t budget_left_ = 0;
-  // [axis] of this settle(), and of earlier ones with rows that still wait (m).
+  // [axis] Margin of this settle(), and of earlier ones with rows that still wait (m).
   std::array<float, 3> margin_{};
   LazyArray<ChainWave::Source> raised_, lowered_;
   bool stopped_by_moving_ = false;  // a moving obstacle has stopped some voxel in this call

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The functions of lanes8.h for AVX-512: registers of 16 floats, and comparisons that give a mask. This
 // halves the operations on a row, and the test whether any lane moves is a single one. Results are the same
-// to the last bit. Written in intrinsics, because the compiler's generic vectors of 16 are slower than those
-// of 8.
+// to the last bit. The functions are written in intrinsics, because the compiler's generic vectors of 16 are
+// slower than those of 8.
 #pragma once
 
 #include "voxel/chain/lanes8.h"
@@ -22,8 +22,8 @@ using lanes8::required_value;
 constexpr std::size_t kWidth = 16, kVectors = kRow / kWidth;
 using Floats = float __attribute__((vector_size(4 * kWidth)));
 using Masks = __mmask16;
-constexpr Masks kAllLanes =
-    0xFFFF;  // masked forms throughout: GCC 12 warns of its headers for the unmasked ones
+// Intrinsics are used in their masked forms, because GCC 12 warns of its own headers for the unmasked ones.
+constexpr Masks kAllLanes = 0xFFFF;
 
 // Does this processor have AVX-512, and does the system save its registers?
 inline bool has_lanes16() {

@@ -11,13 +11,13 @@
 #include "voxel/chain/row_kernels.h"
 #include "voxel/lattice/row_grid.h"
 
-// Inlined into the functions of every width, whatever their size.
+// These functions are inlined into the functions of every width, whatever their size.
 #define HYBRID_INLINE inline __attribute__((always_inline))
 
 namespace voxel::lanes8 {
 
-// Explicit vectors: from plain loops the compiler generates neither table look-ups in registers nor the test
-// whether any lane moves. Where registers are narrower, it splits these vectors.
+// Vectors are explicit, because from plain loops the compiler generates neither table look-ups in registers
+// nor the test whether any lane moves. Where registers are narrower, it splits these vectors.
 constexpr std::size_t kWidth = 8, kVectors = kRow / kWidth;
 using Floats = float __attribute__((vector_size(4 * kWidth)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kWidth)));
@@ -31,7 +31,8 @@ HYBRID_INLINE void store(const Floats& value, float* at) {
 HYBRID_INLINE void broadcast(float value, Floats& out) {
   out = Floats{} + value;
 }
-// out: lanes n − kBy …, n + kBy … of two consecutive vectors; kBy is 0, 1, 2 or 4.
+// Lane n of `out` is lane n − kBy (shift_up_by) or n + kBy (shift_down_by) of two consecutive vectors. kBy is
+// 0, 1, 2 or 4.
 template <std::size_t kBy>
 HYBRID_INLINE void shift_up_by(const Floats& before, const Floats& value, Floats& out) {
   static_assert(kBy < kWidth);
@@ -57,7 +58,7 @@ HYBRID_INLINE bool any_of(const Masks& mask) {
   return (halves[0] | halves[1] | halves[2] | halves[3]) != 0;
 }
 
-// A table of half limits; its first 16 values in registers.
+// A table of half limits. Registers hold its first 16 values.
 struct Table {
   const float* values;
   Floats low, high;

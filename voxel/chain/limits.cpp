@@ -31,7 +31,7 @@ ChainLimits::WaveLimits ChainLimits::for_wave(int axis, Way way) const {
   for (int n = 0; n < kDirections; ++n) {
     const auto d = static_cast<std::size_t>(n / 2);
     const bool up = n % 2 == 0;
-    // Below a raised voxel the links get longer, above it they get shorter; round a lowered voxel the
+    // Below a raised voxel the links get longer, above it they get shorter. Around a lowered voxel it is the
     // reverse.
     const HalfLimitTable& along = up == (way == Way::raise) ? shorter_[d] : longer_[d];
     result.half[static_cast<std::size_t>(n)] = axis == n / 2 ? along.data() : across_[d].data();

@@ -26,9 +26,9 @@ class ChainLimits {
   // [label] (m); kUnbounded for label 0 and for labels that no voxel has.
   using HalfLimitTable = std::array<float, 256>;
 
-  // Of a wave on one axis. A voxel raised to u requires its neighbour in direction n to be at least u −
-  // limit; one lowered to u requires at most u + limit. limit = half[n][label] + half[n][the neighbour's
-  // label] >= 0.
+  // Half limits of a wave on one axis, by direction. A voxel raised to u requires its neighbour in direction
+  // n to be at least u − limit. A voxel lowered to u requires at most u + limit. limit = half[n][label] +
+  // half[n][the neighbour's label] >= 0.
   struct WaveLimits {
     std::array<const float*, kDirections> half{};
 
@@ -38,7 +38,7 @@ class ChainLimits {
     }
   };
   [[nodiscard]] WaveLimits for_wave(int axis, Way way) const;
-  // Registers of 8 floats that hold a table up to the largest label in use: 1, 2, or 0 for more.
+  // Number of registers of 8 floats that hold a table up to the largest label in use: 1, 2, or 0 for more.
   [[nodiscard]] int registers() const { return registers_; }
 
  private:

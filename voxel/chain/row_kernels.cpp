@@ -11,7 +11,8 @@ namespace {
 
 using namespace lanes8;
 
-// `limit_of(i, out)`: limits of the links of lanes i … i + kWidth − 1.
+// Relaxes the links from row `from` to row `to`. `limit_of(i, out)`: limits of the links of lanes i … i +
+// kWidth − 1.
 template <bool kRaise, class LimitOf>
 HYBRID_INLINE Moved beside(const float* from, float* to, float margin, const LimitOf& limit_of) {
   std::array<Floats, kVectors> result;
@@ -37,8 +38,8 @@ HYBRID_INLINE Moved beside(const float* from, float* to, float margin, const Lim
 
 // Relaxes all links of the row at once, until no voxel moves. Most rows have their values from the rows
 // beside them already, so one or two rounds suffice. A sequential pass from end to end takes longer even if a
-// wave runs along the whole row. `below(i, out)`: limits between lanes i − 1 … and i …, `above`: between i …
-// and i + 1 ….
+// wave runs along the whole row. `below(i, out)`: limits of the links below lanes i … i + kWidth − 1.
+// `above`: limits of the links above them.
 template <bool kRaise, class Below, class Above>
 HYBRID_INLINE Moved along(float* row, float margin, const Below& below, const Above& above) {
   std::array<Floats, kVectors> now, from_below, from_above;
@@ -130,7 +131,7 @@ HYBRID_INLINE Moved along_alike(float* row, float up, float down, float margin) 
 // Half a row: one cache line, and one register of AVX-512.
 constexpr int kHalf = kRow / 2;
 constexpr int kConePrefetchRows = 12;
-// A row that is raised by so many margins is raised by clearly more than rounding.
+// A row that is raised by at least this many margins is raised by clearly more than rounding.
 constexpr float kClearMargins = 16.0F;
 using Line = float __attribute__((vector_size(4 * kHalf)));
 HYBRID_INLINE float apex_at(const ConeColumn& c, int n) {

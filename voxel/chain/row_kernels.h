@@ -2,11 +2,11 @@
 // Innermost loops of the chain: relaxation of the links of one row on one axis, in vectors.
 //
 // Relaxing a link (as in Bellman-Ford) moves one of its voxels as far as the link's limit requires, given the
-// other voxel. Each function comes as raise_… and as lower_…, its mirror image. Raising, a voxel goes up to
-// its neighbour's displacement minus the limit.
+// other voxel. Each function comes as raise_… and as lower_…, its mirror image. A raised voxel goes up to its
+// neighbour's displacement minus the limit.
 //
-// `margin` (m) is the rounding that a state carries from earlier waves. A required move of no more than the
-// margin moves nothing. Otherwise every wave would correct the last bits of all waves before it.
+// `margin` (m) is the rounding that a state carries from earlier waves. A required move of at most the margin
+// is not made. Otherwise every wave would correct the last bits of all waves before it.
 #pragma once
 
 #include <cstddef>
@@ -22,10 +22,11 @@ inline constexpr float kUnbounded = 1e30F;
 // Half limits by label; see ChainLimits.
 struct HalfLimits {
   const float* table;
-  int registers;  // of 8 floats, for the values up to the largest label in use: 1, 2, or 0 for more
+  int registers;  // registers of 8 floats that hold the table up to the largest label in use: 1, 2, or 0 for
+                  // more
 };
 
-// Bits: some voxel of the row moved, its first one did, its last one did.
+// Bits: some voxel of the row moved; its first one moved; its last one moved.
 using Moved = std::uint8_t;
 inline constexpr Moved kNothingMoved = 0, kAnyMoved = 1, kFirstMoved = 2, kLastMoved = 4;
 
@@ -46,11 +47,11 @@ Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up, 
 Moved raise_along_alike(float* row, float up, float down, float margin) noexcept;
 Moved lower_along_alike(float* row, float up, float down, float margin) noexcept;
 
-// A cone over one column of rows consecutive in y. Raised, lane i of row n gets at least apex + n·slope −
-// fall[i]; n is 0 in the row of the cone's apex. The cone is written in half rows (a cache line each). Its
-// half rows end before the first row in which the lane with the least fall is not raised by more than the
-// margin. In a state without violations voxels are raised less the further they are from the apex; so the end
-// is searched from a guess.
+// A cone over one column of rows that are consecutive in y. A raising cone lifts lane i of row n to at least
+// apex + n·slope − fall[i]. Row 0 is the row at the y of the cone's apex. The cone is written in half rows (a
+// cache line each). Each half ends before the first row in which its lane with the least fall is not raised
+// by more than the margin. In a state without violations, voxels further from the apex are raised less. So
+// the end is searched from a guess.
 struct ConeColumn {
   float* own = nullptr;                     // row 0
   std::ptrdiff_t next = 0;                  // offset from a row to the one to prefetch (floats)
@@ -61,8 +62,8 @@ struct ConeColumn {
   int nearest = 0;                          // the lane with the least fall
   bool has_apex = false;                    // the half of row 0 with this lane counts as raised
 };
-// Rows raised above and below row 0: in the half with the nearest lane, in the other half (never more). As
-// input: guesses of these numbers.
+// Numbers of rows raised above and below row 0: in the half with the nearest lane (near), and in the other
+// half (far, never more). As input they are guesses.
 struct ConeEnds {
   int near_up = 0, near_down = 0, far_up = 0, far_down = 0;
 };

@@ -18,7 +18,7 @@ inline constexpr std::uint32_t kFullRow = 0xFFFFFFFFU;  // RowInfo::free of a ro
 // rows.
 struct RowInfo {
   std::uint32_t free = 0;     // bit of each lane: a voxel that is not anchored
-  std::uint8_t label = 0;     // of a row full of free voxels of one label; else 0
+  std::uint8_t label = 0;     // label of a row that is full of free voxels of one label; else 0
   bool filled : 1 = false;    // has any voxel
   bool anchored : 1 = false;  // has any anchor
   bool known : 1 = false;     // the fields above are set
@@ -34,7 +34,8 @@ struct RowStrip {
   const RowInfo* info = nullptr;
 };
 
-// Half limits by label, of links into the row from the row before it, and of the same links in reverse.
+// Half limits by label of the links between a row and the row before it: into the row (`in`), and in reverse
+// (`back`).
 struct LinkHalves {
   const float* in = nullptr;
   const float* back = nullptr;
@@ -53,15 +54,15 @@ enum Pending : std::uint8_t {
 struct SweepTask {
   RowStrip own, z, x;  // the strip, and the strips before it in z and x (u null: none)
   std::uint8_t* pending = nullptr;
-  // Rows with one of these Pending bits are relaxed, among the first `count`; and rows that follow a row that
-  // moved, among the first `max_rows`. Relaxed rows lose the bits.
+  // Rows among the first `count` with one of these Pending bits are relaxed. So are rows among the first
+  // `max_rows` that follow a moved row. Relaxed rows lose the bits.
   std::uint8_t mask = 0;
   int step = 1;  // rows from one to the next: 1 or −1
   int count = 0;
   int max_rows = 0;
-  bool y = true;  // relax the links from the rows before them in y, too
+  bool y = true;  // relax the links from the row before in y, too
   LinkHalves along_y, along_z, along_x;
-  const float* up = nullptr;  // within the row, as in raise_along()
+  const float* up = nullptr;  // half limits within the row, as in raise_along()
   const float* down = nullptr;
   int registers = 1;
   bool x_above = false;  // the strip before in x is on the side of the last lane, not of the first

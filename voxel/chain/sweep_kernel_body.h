@@ -43,7 +43,8 @@ HYBRID_INLINE void shift_row(const RowValues& row, float beyond, RowValues& out)
     shift_row_down<kStep>(row, filler, out);
 }
 
-// Limits of paths twice as long: each lane's plus that of the lane kStep before it (up) or after it (down).
+// Limits of paths twice as long: adds to each lane's limit that of the lane kStep before it (up) or after it
+// (down).
 template <bool kUp, std::size_t kStep>
 HYBRID_INLINE void double_limits(RowValues& limit) {
   RowValues further;
@@ -64,11 +65,11 @@ HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
   if (kStep < 16) double_limits<kUp, kStep>(limit);
 }
 
-// All paths within a row, by doubling their length: over one link, two, four, … Five steps suffice, where
-// single links would take up to 31. Paths upwards and downwards are independent, because a detour is never
-// stronger than the direct path. They are interleaved, because each step waits for the one before. `up`:
-// limits between lanes n − 1 and n, `down`: between n and n + 1. False, and `required` undefined, if no voxel
-// requires a move of its neighbour.
+// Finds the displacements that all paths within a row require. In each step the paths double their length:
+// one link, two, four, … Five steps suffice, where single links would take up to 31. Paths upwards and
+// downwards are independent, because a detour is never stronger than the direct path. Both are interleaved,
+// because each step waits for the one before. `up`: limits between lanes n − 1 and n. `down`: limits between
+// n and n + 1. False, and `required` undefined, if no voxel requires a move of its neighbour.
 template <bool kRaise>
 HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& down, float margin,
                              RowValues& required) {
@@ -150,8 +151,8 @@ HYBRID_INLINE void find_revisits(const RowValues& now, Limits& limits, const Row
   }
 }
 
-// Limits of the links between a row and the row before it, into the row (in) and in reverse (back, after
-// turn()): AlikeLimits if both rows have one label each, LabelLimits by the label of each voxel.
+// Limits of the links between a row and the row before it: into the row (in), and in reverse (back, after
+// turn()). AlikeLimits are for two rows of one label each, LabelLimits go by the label of each voxel.
 struct AlikeLimits {
   Floats in_, back_;
   HYBRID_INLINE AlikeLimits(const LinkHalves& half, std::uint8_t own, std::uint8_t other) {
@@ -226,7 +227,7 @@ HYBRID_INLINE void relax_along(const SweepTask& p, std::uint8_t label, const std
 struct RowNow {
   float* u;
   const std::uint8_t* labels;
-  std::uint8_t label;  // 0: voxel by voxel
+  std::uint8_t label;  // 0: labels differ and are looked up by voxel
   bool has_y, has_z, has_x, closed;
   const float* x;
   std::uint8_t x_label;
@@ -240,7 +241,7 @@ HYBRID_INLINE bool revisits_x(const SweepTask& p, const RowNow& row) {
                          *row.x, p.margin);
 }
 
-// `y`: the row before in y; becomes the row itself if it moved.
+// Relaxes a row. `y` is the row before it in y, and becomes the row itself if it moved.
 template <bool kRaise, int kRegisters, class Limits>
 HYBRID_INLINE Moved sweep_row(const SweepTask& p, const RowNow& row, Limits& by_y, Limits& by_z,
                               const RowValues& z, RowValues& y) {
@@ -315,8 +316,8 @@ struct UniformRows {
 // Relaxes a row within one label, or next to labels with tighter limits. The links within the row then allow
 // whatever the rows before it require. The row requires nothing of the row before it in y either: that row
 // already has its value through the row before both in z, along a path of equal length. The reverse links in
-// z must still be checked, because the same argument for z relies on y. False, and nothing done, if the row
-// in x requires more.
+// z must still be checked, because the same argument for z relies on y. If the row before in x requires more,
+// the function does nothing and returns false.
 template <bool kRaise>
 HYBRID_INLINE bool sweep_uniform(const SweepTask& p, UniformRows& rows, std::ptrdiff_t k, RowValues& y,
                                  Moved& what) {
@@ -400,7 +401,7 @@ HYBRID_INLINE SweepResult sweep_rows(const SweepTask& p, int most_visits, Moved*
     if (row.closed && p.y && has_z && has_x && label == y_label &&
         p.z.info[(k - 1) * step].label == z_label && UniformRows::one_label(p.x.info[k * step]) &&
         p.along_y.in[z_label] <= p.along_y.in[label] && p.along_y.back[z_label] <= p.along_y.back[label]) {
-      // As long as rows are of the same kind and each of them moves.
+      // Continues as long as rows are of the same kind and each of them moves.
       UniformRows rows(p, label, z_label, p.x.info[k * step].label);
       bool done = false;
       while (sweep_uniform<kRaise>(p, rows, k, y, moved_out[k])) {

@@ -8,7 +8,7 @@ namespace voxel {
 namespace {
 
 constexpr std::size_t kPrefetchRows = 12;
-constexpr std::size_t kMaxCones = 4;  // sources that are spread by a cone each; more by one sweep
+constexpr std::size_t kMaxCones = 4;  // up to this many sources get a cone each; more get one sweep
 
 }  // namespace
 
@@ -77,7 +77,8 @@ void ChainWave::begin() noexcept {
   work_ = 0;
 }
 
-// A pulled anchor stays. So what a raising wave raised too far for it must be lowered again, and the reverse.
+// A pulled anchor stays. So voxels that a raising wave raised too far for the anchor must be lowered again,
+// and the reverse.
 void ChainWave::note_pulled(const WaveArgs& p, RowId row) noexcept {
   std::uint8_t& by = pulled_by_[row];
   if (by == 0) pulled_[pulled_count_++] = row;
@@ -146,7 +147,7 @@ void ChainWave::relax_beside(const WaveArgs& p, RowId row, RowId to, int directi
   enqueue(to, moves & (first | last));
 }
 
-// In a row with anchors: moves the free voxels to `required`. Anchors that it would move are pulled.
+// Moves the free voxels of a row with anchors to `required`. Anchors that would have to move are pulled.
 Moved ChainWave::move_free(const WaveArgs& p, RowId row, const float* required) noexcept {
   float* const u = row_at(p, row);
   const std::uint32_t free = info(row).free;
@@ -162,8 +163,8 @@ Moved ChainWave::move_free(const WaveArgs& p, RowId row, const float* required) 
                             (moves >> (kRow - 1) != 0 ? kLastMoved : 0));
 }
 
-// relax_within() of a row with anchors. As long as no anchor is pulled the row is relaxed as a whole;
-// otherwise voxel by voxel, because nothing may move on account of an anchor that stays.
+// relax_within() for a row with anchors. As long as no anchor is pulled, the row is relaxed as a whole.
+// Otherwise it is relaxed voxel by voxel, because nothing may move on account of an anchor that stays.
 Moved ChainWave::relax_within_anchored(const WaveArgs& p, RowId row) noexcept {
   std::array<float, kRow + 2> required;  // with one value beyond both ends, which the kernels read
   std::copy_n(row_at(p, row) - 1, required.size(), required.data());
@@ -207,7 +208,7 @@ Moved ChainWave::relax_within_by_label(const WaveArgs& p, RowId row, float* u) n
 
 void ChainWave::relax_neighbours(const WaveArgs& p, RowId row) noexcept {
   const Grid& grid = lattice_.grid();
-  // Cleared first, because a row with anchors may enqueue itself again.
+  // The marks are cleared first, because a row with anchors may enqueue itself again.
   std::uint8_t ends = rows_[row].mark & (first | last);
   rows_[row].mark &= static_cast<std::uint8_t>(~(queued | first | last));
   ends |= relax_within(p, row);
@@ -219,7 +220,7 @@ void ChainWave::relax_neighbours(const WaveArgs& p, RowId row) noexcept {
   if ((ends & first) != 0) relax_across(p, row, row - grid.row_x, 1);
 }
 
-// Prefetches the neighbours of a row further back in the queue; they lie at six places in memory.
+// Prefetches the neighbours of a row further back in the queue, which lie at six places in memory.
 inline void ChainWave::prefetch_around(const WaveArgs& p, RowId row) const noexcept {
   const Grid& grid = lattice_.grid();
   const RowInfo info = rows_[row];
@@ -272,8 +273,8 @@ void ChainWave::postpone(RowId row, std::uint8_t waves) noexcept {
   waits |= static_cast<std::uint8_t>(waves | kListed);
 }
 
-// Is any link of a voxel violated, or at its limit within the margin? Links within the margin count too, so
-// that the waves that pass repair violations by rounding. Without a neighbour the limit is unbounded.
+// Is any link of a voxel violated, or at its limit within the margin? Links within the margin count, too, so
+// that passing waves repair violations by rounding. The limit to a missing neighbour is unbounded.
 bool ChainWave::has_binding_link(const WaveArgs& p, VoxelId v) const noexcept {
   const std::uint8_t label = lattice_.label(v);
   for (int n = 0; n < kDirections; ++n) {
@@ -289,7 +290,7 @@ std::uint64_t ChainWave::spread(float* u, int axis, Way way, std::span<Source> s
                                 std::uint64_t most) noexcept {
   if (sources.empty()) return 0;
   WaveArgs p{u, axis, way, margin, limits_.for_wave(axis, way), {}};
-  // The strongest source first: what follows it needs no second visit.
+  // The strongest source comes first, so that voxels that follow it need no second visit.
   std::sort(sources.begin(), sources.end(), [way](const Source& a, const Source& b) {
     if (a.u != b.u) return way == Way::raise ? a.u > b.u : a.u < b.u;
     return a.v < b.v;
@@ -312,14 +313,15 @@ std::uint64_t ChainWave::spread(float* u, int axis, Way way, std::span<Source> s
     u[s.v] = s.u;
     sources[moves++] = s;
     if (!cones || !has_binding_link(p, s.v)) continue;
-    // One source after another.
+    // Each source spreads before the next one.
     if (!no_row_waits || !cone(p, s.v, left())) {
       if (!no_row_waits || !sweep(p, {&s, 1}, left(), visits)) enqueue(s.v / kRow);
     }
     visits += run_queue(p, left());
   }
   if (!cones) {
-    // Only from sources with a binding link: when a tool hardly moves, few of its pressed voxels have one.
+    // The wave starts only from sources with a binding link. If a tool hardly moves, few of its pressed
+    // voxels have one.
     const std::span<Source> moving = sources.first(moves);
     const auto binding = moving.first(
         static_cast<std::size_t>(std::remove_if(moving.begin(), moving.end(),

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One wave on one axis: everything that the sources raise, or everything that they lower.
 //
-// Raising, a voxel goes to the greatest of u(neighbour) − limit over its links, and its own neighbours
-// follow. This is a longest path from the sources, and its result does not depend on the order of visits.
-// There are three methods:
+// In a raising wave a voxel goes to the greatest of u(neighbour) − limit over its links, and its own
+// neighbours follow. This is a longest path from the sources, and its result does not depend on the order of
+// visits. There are three methods:
 // - If all limits of a direction are equal and the box that a source reaches is full, distances are steps
 //   times limits, and the source's cone is written row by row in closed form (wave_cone.cpp).
 // - Elsewhere rows are swept away from the sources (wave_sweep.cpp). Where no sweep can start, and beyond
@@ -56,12 +56,12 @@ class ChainWave {
   // bit of the result.
   std::uint64_t spread(float* u, int axis, Way way, std::span<Source> sources, float margin,
                        std::uint64_t most = kUnlimited) noexcept;
-  // On this axis and in direction `way`: moves the neighbours of anchors that waves in the other direction
-  // pulled.
+  // Moves the neighbours of anchors that waves in the other direction pulled, on this axis and in direction
+  // `way`.
   std::uint64_t spread_from_pulled(float* u, int axis, Way way, float margin,
                                    std::uint64_t most = kUnlimited) noexcept;
-  // To continue with the waiting rows: take_waiting(), one wave for each axis and direction, then put_back()
-  // of the rows that these left.
+  // To continue with the waiting rows, call take_waiting(), then one wave for each axis and direction, then
+  // put_back() for the rows that these left.
   void take_waiting() noexcept;
   std::uint64_t spread_from_taken(float* u, int axis, Way way, float margin,
                                   std::uint64_t most = kUnlimited) noexcept;
@@ -77,7 +77,7 @@ class ChainWave {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr std::uint64_t kConeRows = 8;  // rows of a cone take about as long as one row update
+  static constexpr std::uint64_t kConeRows = 8;  // this many rows of a cone take as long as one row update
   // first, last: the first or the last voxel of the row has moved since the row was last visited.
   enum Mark : std::uint8_t { first = kFirstMoved, last = kLastMoved, queued = 8 };
   struct WaveArgs {
@@ -86,7 +86,7 @@ class ChainWave {
     Way way = Way::raise;
     float margin = 0.0F;
     ChainLimits::WaveLimits limits;
-    std::array<double, kDirections> limit{};  // of all links, if they are equal
+    std::array<double, kDirections> limit{};  // limits of all links by direction, if they are equal
   };
   static constexpr std::uint8_t kListed = 64;  // bit of RowInfo::waits: the row is in waiting_
   [[nodiscard]] static std::uint8_t wave_bit(int axis, Way way) {
@@ -107,17 +107,17 @@ class ChainWave {
   struct Sweep {
     int column = 0, y = 0;           // the middle of the sources, from which rows are swept outwards
     IntRange sources;                // planes of the sources
-    std::array<IntRange, 2> planes;  // with pending rows, of a sweep upwards in z (0) and downwards (1)
-    IntRange columns;                // with pending rows
+    std::array<IntRange, 2> planes;  // planes with pending rows: [0] upwards in z, [1] downwards
+    IntRange columns;                // columns with pending rows
     Plane plane;
     SweepTask task;       // the part that is the same for many rows
     IntRange up, down;    // rows of this plane and column pending in a sweep upwards or downwards in y
-    IntRange next, back;  // rows that have pending links to the next plane, to the one before
+    IntRange next, back;  // rows with pending links to the next plane; to the plane before
     IntRange rest;        // rows that may be pending when the sweep is stopped
     std::uint64_t visits = 0, most = 0;
-    bool stopped = false;  // by its budget
+    bool stopped = false;  // the budget ended it
   };
-  // Row updates. With fewer left the queue is used, which takes the nearest rows first.
+  // With fewer row updates left than this, the queue is used, which takes the nearest rows first.
   static constexpr std::uint64_t kMinSweepBudget = 512;
   struct ConeBox {
     std::array<int, kDirections> steps{};  // voxels from the apex in each direction
@@ -127,8 +127,8 @@ class ChainWave {
   [[nodiscard]] float* row_at(const WaveArgs& p, RowId row) const noexcept {
     return p.u + static_cast<std::size_t>(row) * kRow;
   }
-  // Looked up at the first use, to save memory. All rows of a line in y are looked up together, so that the
-  // RowInfo of a row's neighbours in y is known if its own is.
+  // A RowInfo is looked up at its first use, to save memory. All rows of a line in y are looked up together,
+  // so that the RowInfo of a row's neighbours in y is known if its own is.
   [[nodiscard]] const RowInfo& info(RowId row) noexcept {
     if (!rows_[row].known) look_up(row);
     return rows_[row];
@@ -182,8 +182,8 @@ class ChainWave {
   LazyArray<std::uint8_t> pulled_by_;     // [row] bit of each wave that must start here from a pulled anchor
   LazyArray<std::uint8_t> pending_;       // [row] Pending bits; 0 between sweeps
   std::vector<IntRange> pending_ranges_;  // [sense][column][z + 1] y of pending rows; empty between sweeps
-  std::vector<std::array<IntRange, 2>>
-      pending_in_plane_;      // [column][sense in x] of the plane that is being swept
+  // [column][sense in x] y of pending rows in the plane that is being swept
+  std::vector<std::array<IntRange, 2>> pending_in_plane_;
   std::vector<Moved> moves_;  // [n] of the strip that is being swept
   std::vector<float> fall_;   // [column][lane] of the cone that is being written
   std::uint64_t work_ = 0, cone_rows_ = 0;

@@ -8,9 +8,9 @@
 
 namespace voxel {
 // Extent of a cone along the three lines through its apex. If the box of these extents, with one voxel beyond
-// each end, holds free voxels only, the cone raises nothing outside: a raised voxel is raised all along every
-// shortest path to it, and one of these paths runs along such a line. Bisection for the ends would be wrong:
-// rounding decides which voxels are raised where a cone lies on an older one.
+// each end, holds free voxels only, the cone raises nothing outside. The reason: if a voxel is raised, so are
+// all voxels on every shortest path to it, and one of these paths runs along such a line. The ends must not
+// be found by bisection: where a cone lies on an older one, rounding decides which voxels are raised.
 ChainWave::ConeBox ChainWave::cone_box(const WaveArgs& p, VoxelId apex) noexcept {
   ConeBox box;
   const Grid& grid = lattice_.grid();
@@ -57,7 +57,8 @@ bool ChainWave::cone(const WaveArgs& p, VoxelId apex, std::uint64_t most) noexce
   const std::array<int, 3> at = lattice_.coordinates(apex);
   std::array<int, 3> low{}, high{};
   for (std::size_t d = 0; d < 3; ++d) {
-    // With the first voxels that the cone does not raise: it ends there only if there is no gap among them.
+    // The box includes the first voxels that the cone does not raise. The cone ends there only if there is no
+    // gap among them.
     low[d] = at[d] - box.steps[2 * d + 1] - (box.cut[2 * d + 1] ? 0 : 1);
     high[d] = at[d] + box.steps[2 * d] + (box.cut[2 * d] ? 0 : 1);
   }
@@ -91,7 +92,7 @@ void ChainWave::write_cone(const WaveArgs& p, VoxelId apex, const ConeBox& box) 
                     .down = box.steps[3],
                     .slope_up = sign * p.limit[2],
                     .slope_down = -sign * p.limit[3]};
-  // Plane k of column c; `next`: direction of the plane after it.
+  // Writes plane k of column c. `next`: direction of the plane after it.
   const auto write_plane = [&](int c, int k, int next, ConeEnds& ends) {
     const RowId row = grid.row(c, at[1], at[2] + k);
     column.own = row_at(p, row);
@@ -107,7 +108,7 @@ void ChainWave::write_cone(const WaveArgs& p, VoxelId apex, const ConeBox& box) 
   const auto fewer = [](const ConeEnds& ends, int by) {
     return ConeEnds{ends.near_up - by, ends.near_down - by, ends.far_up - by, ends.far_down - by};
   };
-  // `ends`: of the column's apex plane; as input a guess.
+  // Writes column c. `ends`: ends of the column's apex plane; as input a guess.
   const auto write_column = [&](int c, ConeEnds& ends) {
     column.fall = fall_.data() + static_cast<std::size_t>(c) * kRow;
     column.nearest = c == own_column ? at[0] % kRow : c > own_column ? 0 : kRow - 1;

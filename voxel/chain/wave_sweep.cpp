@@ -4,8 +4,8 @@
 // Planes (z), in each plane columns, and in each column rows are relaxed outwards from the sources, each row
 // from the rows before it. This is the order of paths without detours. If a row requires a move of a row
 // before it, a path has a detour, and that row is visited again: within a plane until nothing is pending,
-// between planes on the way back. A visit reads and writes a row once. In a queue each neighbour reads it,
-// and a detour found late invalidates everything done since.
+// between planes on the way back. A visit reads and writes a row once. With a queue, each neighbour would
+// read it, and a detour found late would invalidate everything done since.
 #include <algorithm>
 #include <utility>
 
@@ -229,8 +229,8 @@ void ChainWave::sweep_strip(const WaveArgs& p, Sweep& sweep, int step, const Int
   }
 }
 
-// The rows of one column in a plane: from the middle of the sources upwards and downwards in y, repeated
-// until none is pending.
+// Sweeps the rows of one column in a plane: from the middle of the sources upwards and downwards in y,
+// repeated until none is pending.
 void ChainWave::sweep_column(const WaveArgs& p, Sweep& sweep, int column, int x,
                              const IntRange& span) noexcept {
   Plane& plane = sweep.plane;
@@ -267,7 +267,7 @@ void ChainWave::sweep_column(const WaveArgs& p, Sweep& sweep, int column, int x,
   pass_to_plane(plane.at - plane.z, plane.z > 0 ? 1 : 0, sweep.back);
 }
 
-// The columns of one plane, outwards in x and repeated until none is pending.
+// Sweeps the columns of one plane, outwards in x and repeated until none is pending.
 void ChainWave::sweep_plane(const WaveArgs& p, Sweep& sweep, int z, int by) noexcept {
   const int sense = by > 0 ? 0 : 1;
   sweep.plane.at = z;
@@ -300,7 +300,7 @@ void ChainWave::sweep_plane(const WaveArgs& p, Sweep& sweep, int z, int by) noex
   if (sweep.stopped) sweep.planes[static_cast<std::size_t>(sense)].add(z);
 }
 
-// After a sweep that was stopped: rows whose links to a pending row are yet to be relaxed wait.
+// After a stopped sweep, a row has to wait if its links to a pending row are yet to be relaxed.
 void ChainWave::stop_sweep(const WaveArgs& p, Sweep& sweep) noexcept {
   const Grid& grid = lattice_.grid();
   const std::array<RowId, 6> from{1, ~RowId{0}, grid.row_x, ~grid.row_x + 1, grid.row_z, ~grid.row_z + 1};
@@ -322,8 +322,8 @@ void ChainWave::stop_sweep(const WaveArgs& p, Sweep& sweep) noexcept {
   }
 }
 
-// Moves the voxels that must follow the sources, which are at their new places already. False if the queue
-// must do it.
+// Moves the voxels that must follow the sources, which are at their new places already. False if no sweep is
+// possible: then the queue must do it.
 bool ChainWave::sweep(const WaveArgs& p, std::span<const Source> sources, std::uint64_t most,
                       std::uint64_t& visits) noexcept {
   Sweep sweep;

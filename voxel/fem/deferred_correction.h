@@ -107,7 +107,7 @@ class BrickLoads {
   std::array<LazyArray<float>, 3> step_;     // [axis][v]: the last step (N)
   float least_N_ = 0.0F, left_N_ = 0.0F, worst_N_ = 0.0F;
   float calm_ = 1.0F;             // factor of share_ and carry_on_; falls while rounds make no progress
-  float least_left_N_ = 0.0F;     // least left_N_ since the contact last changed
+  float least_left_N_ = 0.0F;     // least left_N_ since the error last grew by kElsewhere
   int without_gain_ = 0;          // rounds
   LazyArray<std::uint8_t> mark_;  // [row]
   Rows moved_, due_, retry_;      // retry_: rows that this round changed

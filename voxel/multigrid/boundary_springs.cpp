@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which cells have boundary springs: of held and sliding voxels, whose cells are queued, and of anchors,
-// found when first asked for.
+// Finds the cells with boundary springs. Cells of held and sliding voxels are queued. Cells of anchors are
+// found on first use.
 #include "voxel/multigrid/boundary_springs.h"
 
 #include <algorithm>
@@ -11,10 +11,10 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kQueued = 65536;  // cells renewed together
+constexpr std::size_t kQueued = 65536;  // cells that the queue holds
 // Cells that change with a voxel: its own and those of its neighbours.
 constexpr std::size_t kMostOfAVoxel = 7;
-// Lanes of the coarser row above lanes of a row (of its first half).
+// Lanes of a coarser row above the given lanes of the first of its two child rows along x.
 std::uint32_t lanes_above(std::uint32_t lanes) {
   std::uint32_t out = 0;
   for (std::uint32_t rest = lanes; rest != 0;) {
@@ -54,7 +54,7 @@ BoundarySprings::BoundarySprings(const Lattice& lattice, const std::vector<Level
   wait_for_anchors();
 }
 
-// Marks the rows on each level with a cell that anchors may fix.
+// On each level, marks the rows with a cell that anchors may fix.
 void BoundarySprings::wait_for_anchors() {
   const auto above = [this](int level, RowId row) {
     const std::array<int, 3> c = at(level - 1).couplings->grid().row_coordinates(row);
@@ -116,7 +116,7 @@ std::uint32_t BoundarySprings::voxels_at_anchors(RowId row) const noexcept {
   return lanes & filled;
 }
 
-// Lanes of the cells above such voxels.
+// Lanes of the cells of a row that contain such voxels.
 std::uint32_t BoundarySprings::cells_at_anchors(int level, RowId row) const noexcept {
   const Grid& finer = at(level - 1).couplings->grid();
   const std::array<int, 3> c = at(level).couplings->grid().row_coordinates(row);
@@ -160,7 +160,7 @@ BoundarySprings::Found BoundarySprings::recorded(int level, const Record& record
   return found;
 }
 
-// Springs of a cell whose row waits.
+// Springs of a cell in a waiting row, which are not stored yet.
 BoundarySprings::Found BoundarySprings::waiting(int level, VoxelId cell) const noexcept {
   if (level < LevelStiffness::kKept) return find(level, cell);
   for (const Record& record : records_in(level, cell / kRow)) {

@@ -2,11 +2,11 @@
 // Boundary springs: the stiffness that fixed voxels (anchors, tool contacts, and obstacle contacts along
 // their normal) add to each coarse cell.
 //
-// A free voxel linked to a fixed one is a spring from its cell to the fixed place. On the next coarser level
-// that spring is in series with half a link of its level, because the middle of the coarser cell is that much
-// further away. So a fixed plane stays where it is on every level, and a single fixed voxel holds a large
-// cell by about the stiffness of one voxel in an infinite lattice (3.96 of its links; Cserti, Am. J. Phys.
-// 68, 2000). Each axis, and links in each direction, are treated independently.
+// A link from a free voxel to a fixed one is a spring between the free voxel's cell and the fixed place. On
+// the next coarser level this spring is in series with half a link of that level, because the middle of the
+// coarser cell is that much further away. So a fixed plane stays where it is on every level, and a single
+// fixed voxel holds a large cell by about the stiffness of one voxel in an infinite lattice (3.96 of its
+// links; Cserti, Am. J. Phys. 68, 2000). Each axis, and links in each direction, are treated independently.
 #pragma once
 
 #include <array>
@@ -27,8 +27,8 @@ class BoundarySprings {
   // obstacle.
   struct Support {
     enum class By : std::uint8_t { nothing, obstacle, tool, all } by = By::nothing;
-    std::array<std::int8_t, 3>
-        n{};  // normal in units of 1/kUnit, so that a normal that hardly turns does not change
+    // Normal (unit: 1/kUnit). It is rounded, so that it does not change if the surface hardly turns.
+    std::array<std::int8_t, 3> n{};
     bool operator==(const Support&) const = default;
     [[nodiscard]] bool slides() const { return by == By::obstacle || by == By::tool; }
   };
@@ -47,18 +47,18 @@ class BoundarySprings {
   void renew() noexcept;
 
   // ---- of coarse rows ----
-  // Has any cell of the row a boundary spring? Ask it before the queries below: springs of anchors on fine
-  // levels are found on first use.
+  // True if any cell of the row has a boundary spring. Call it before the queries below, because it finds
+  // springs of anchors on first use.
   [[nodiscard]] bool any(int level, RowId row) noexcept {
     if ((at(level).row_held[row] & kWaits) != 0) find_waiting(level, row);
     return at(level).row_held[row] != 0;
   }
-  // [lane] stiffness of the boundary spring, over the stiffness of all links of the cell.
+  // [lane] Stiffness of the boundary spring divided by that of all links of the cell.
   [[nodiscard]] const float* hold(int level, RowId row, std::size_t axis) const {
     return at(level).hold[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
-  // [lane] A cell takes 1 / (1 + this) of a prolonged correction, because it is nearer to the fixed place
-  // than the middle of the coarser cell is.
+  // [lane] A cell takes the part 1 / (1 + nearer) of a prolonged correction, because it is nearer to the
+  // fixed place than the middle of the coarser cell is.
   [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
     return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
@@ -75,14 +75,15 @@ class BoundarySprings {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links in d (N/m)
+  using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links along d (N/m)
   // Springs of anchors are found when their row is first asked for, because all of them would take much
   // memory. On coarse levels finding them takes long: there they are found on construction and stored without
   // zeros.
   struct Record {
     VoxelId cell;
-    std::uint32_t first;  // index of its values
-    std::uint16_t which;  // bit 3·axis + d: has that value; bit 9 + axis: all of the cell is fixed
+    std::uint32_t first;  // index of its first value in Level::values
+    // Bit 3·axis + d: the cell has that value. Bit 9 + axis: all of the cell is fixed on that axis.
+    std::uint16_t which;
   };
   struct Level {
     LevelStiffness* couplings = nullptr;
@@ -90,16 +91,16 @@ class BoundarySprings {
     std::array<LazyArray<float>, 3> hold, nearer;            // [axis][cell]
     LazyArray<std::uint8_t> row_held;                        // [row] number of non-zero ratios, and kWaits
     std::array<LazyArray<float>, 3> tilt;                    // [xy, xz, yz][cell]
-    LazyArray<std::uint8_t> row_tilted;                      // [row] cells that have any
-    LazyArray<std::uint8_t> queued;                          // [cell] 1: it is queued
-    LazyArray<std::uint32_t> found;                          // [row] lanes of a waiting row that are found
-    // From LevelStiffness::kKept on: of the cells near anchors, sorted.
+    LazyArray<std::uint8_t> row_tilted;  // [row] number of cells with an off-diagonal stiffness
+    LazyArray<std::uint8_t> queued;      // [cell] 1: it is queued
+    LazyArray<std::uint32_t> found;      // [row] lanes of a waiting row whose springs are stored
+    // Springs of the cells near anchors, sorted by cell; on levels from LevelStiffness::kKept on.
     std::vector<Record> records;
     std::vector<float> values;
   };
   static constexpr std::uint8_t kWaits = 0x80;
 
-  struct Found {  // of one cell; as in Level
+  struct Found {  // springs of one cell; members as in Level
     Through through{};
     std::array<float, 3> hold{}, nearer{}, tilt{};
   };
@@ -108,7 +109,7 @@ class BoundarySprings {
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] Support support_of(VoxelId v) const noexcept {
-    // The row is asked first: reading supported_ may take memory.
+    // The row is checked first, because reading supported_ may take memory.
     if ((!held_.empty() && held_mark_[v] != 0) || lattice_.anchored(v)) return kAll;
     return supports(v / kRow) ? supported_[v] : Support{};
   }
@@ -131,8 +132,8 @@ class BoundarySprings {
   void queue(int level, VoxelId cell) noexcept;
   void renew(int level, VoxelId cell) noexcept;
   [[nodiscard]] Found find(int level, VoxelId cell) const noexcept;
-  // `all`: axes on which all of the cell is fixed. find_first() and find_above() find the springs, complete()
-  // the rest.
+  // find_first() and find_above() find the springs of a cell; complete() finds `hold` and `nearer`. `all`:
+  // axes on which all of the cell is fixed.
   void find_first(VoxelId cell, Found& found, Axes& all) const noexcept;
   void find_above(int level, VoxelId cell, Found& found, Axes& all) const noexcept;
   void complete(int level, VoxelId cell, const Axes& all, Found& found) const noexcept;

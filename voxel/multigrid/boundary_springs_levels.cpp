@@ -22,8 +22,8 @@ void for_children(const Grid& finer, const std::array<int, 3>& cell, const Visit
   }
 }
 
-constexpr float kImmovable = 1e4F;  // ratio of a cell that is fixed altogether
-// The same, of a cell whose voxels all slide; in units of the voxels' own springs.
+constexpr float kImmovable = 1e4F;  // `hold` of a cell that is fixed altogether
+// Stiffness of a cell whose voxels all slide (unit: the voxels' own springs).
 constexpr float kAllSlide = 16.0F;
 // Link of a child to its sibling in the same cell along d.
 Spring to_sibling(const VoxelSprings& springs, const std::array<int, 3>& child, std::size_t d) {
@@ -58,15 +58,15 @@ float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
   return compliance > 0.0F ? 1.0F / compliance : 0.0F;
 }
 
-// Parts of a link's springs, by axis and by pair of axes, that resist a voxel with support `own` if the other
-// end has support `other`.
+// Shares of a link's springs, by axis and by pair of axes. These shares resist a voxel with support `own` if
+// the other end has support `other`.
 struct Kept {
   std::array<float, 3> axes, pairs;
 };
 Kept kept_by(const BoundarySprings::Support& own, const BoundarySprings::Support& other) {
   using By = BoundarySprings::Support::By;
   Kept kept{};
-  if (other.by == By::all) {  // it resists all motion that the voxel can make
+  if (other.by == By::all) {  // the other end resists all motion that the voxel can make
     kept.axes = {1.0F, 1.0F, 1.0F};
     if (!own.slides()) return kept;
     const glm::vec3 n = normal_of(own);
@@ -76,8 +76,8 @@ Kept kept_by(const BoundarySprings::Support& own, const BoundarySprings::Support
       kept.pairs[p] = -n[static_cast<int>(kPairs[p][0])] * n[static_cast<int>(kPairs[p][1])];
     return kept;
   }
-  glm::vec3 n =
-      normal_of(other);  // direction in which the other end is fixed, as far as this voxel can move that way
+  // Direction in which the other end is fixed, as far as this voxel can move that way.
+  glm::vec3 n = normal_of(other);
   if (own.slides()) {
     const glm::vec3 stays = normal_of(own);
     n -= (n.x * stays.x + n.y * stays.y + n.z * stays.z) * stays;
@@ -143,8 +143,8 @@ BoundarySprings::Found BoundarySprings::known(int level, VoxelId cell) const noe
   return out;
 }
 
-// From the links between free voxels of the cell and fixed ones. If both are in the cell, the fixed one is
-// half a link from the cell's middle.
+// Finds the springs of a cell on level 1 from the links between its free voxels and fixed ones. If both ends
+// of a link are in the cell, the fixed end is half a link from the cell's middle.
 void BoundarySprings::find_first(VoxelId cell, Found& found, Axes& all) const noexcept {
   const Grid& g = lattice_.grid();
   const LevelStiffness& couplings = *at(0).couplings;
@@ -230,7 +230,7 @@ void BoundarySprings::find_above(int level, VoxelId cell, Found& found, Axes& al
       for (std::size_t d = 0; d < 3; ++d) {
         const float k = to_sibling(springs, c, d).on(static_cast<int>(axis), static_cast<int>(d));
         const float own = child.through[axis][d];
-        if (stays) {  // from the middle of this cell, but for half a voxel
+        if (stays) {  // the fixed place begins half a voxel from the middle of this cell
           through[axis][d] += size * k;
         } else if (own > 0.0F) {
           const float series = k > 0.0F ? 2.0F * k * own / (2.0F * k + own) : own;

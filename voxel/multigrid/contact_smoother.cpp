@@ -14,10 +14,11 @@
 namespace voxel {
 namespace {
 
-// Rounds of a row, in each of which more voxels stay out of their obstacles.
+// Number of times that a row is moved, each time with more voxels kept out of their obstacles.
 constexpr int kObstacleRounds = 3;
 
-// Bit i: lane i of a row is near a rigid surface. Eight lanes at a time, because few of them are.
+// Bit i is set if lane i of a row is near a rigid surface. Eight lanes are tested at a time, because few of
+// them are near one.
 std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
   constexpr std::uint64_t kOnes = 0x0101010101010101U, kLow = 0x7F * kOnes;
   static_assert(std::endian::native == std::endian::little);
@@ -25,14 +26,16 @@ std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
   for (std::size_t n = 0; n < kRow; n += 8) {
     std::uint64_t roles;
     std::memcpy(&roles, state.role.data() + static_cast<std::size_t>(row) * kRow + n, sizeof roles);
-    const std::uint64_t other = roles ^ (Displacement::obstacle * kOnes);  // 0 in each byte that is one
-    const std::uint64_t is = ~(((other & kLow) + kLow) | other) & ~kLow;   // 0x80 in it, 0 in all others
-    lanes |= static_cast<std::uint32_t>((is >> 7U) * 0x0102040810204080U >> 56U) << n;  // its bit in one byte
+    // A byte of `other` is 0 if its lane has the role `obstacle`. Then the byte of `is` is 0x80, else 0. The
+    // product gathers these bits in one byte.
+    const std::uint64_t other = roles ^ (Displacement::obstacle * kOnes);
+    const std::uint64_t is = ~(((other & kLow) + kLow) | other) & ~kLow;
+    lanes |= static_cast<std::uint32_t>((is >> 7U) * 0x0102040810204080U >> 56U) << n;
   }
   return lanes;
 }
 
-// `visit(v, lane)` for the lanes whose bits are set, in order.
+// Calls visit(v, lane) for the lanes whose bits are set, in order.
 template <class Visit>
 void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
   for (; lanes != 0; lanes &= lanes - 1) {
@@ -41,7 +44,7 @@ void for_lanes(RowId row, std::uint32_t lanes, const Visit& visit) {
   }
 }
 
-// `visit(v, lane)` for the pressed voxels of a row in the Float8 of a span.
+// Calls visit(v, lane) for the pressed voxels of a row in the Float8 of a span.
 template <class Visit>
 void for_pressed(const Displacement& state, RowId row, LaneSpan span, const Visit& visit) {
   if (state.row_standing[row] == 0) return;
@@ -72,9 +75,9 @@ float Multigrid::slide_pressed_by(RowId row, const RowVector& way, Displacement&
   return most;
 }
 
-// Moves a row without voxels that this would take into their obstacles; these stay while the others move. If
-// such a voxel were put back afterwards, its neighbours would have followed it into the obstacle as far as
-// links allow, and would hold it there.
+// Moves a row. Voxels that this would take into their obstacles stay while the others move. If such a voxel
+// were put back afterwards, its neighbours would have followed it into the obstacle as far as links allow,
+// and would hold it there.
 template <class Move>
 std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state,
                                       const ObstacleView& obstacles, const Move& move) noexcept {
@@ -116,9 +119,9 @@ float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state
   return std::max(change, slide_pressed(row, state, span));
 }
 
-// Corrects a row of voxels as far as links and obstacles allow. What an obstacle refuses is not subtracted
-// from the cells: such a voxel slides along the obstacle with its neighbours, and cells that took its part
-// back in every cycle would swing between two states.
+// Corrects a row of voxels as far as links and obstacles allow. The part that an obstacle refuses is not
+// subtracted from the cells. A refused voxel slides along the obstacle with its neighbours, and cells that
+// took its part back in every cycle would swing between two states.
 RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
                                         Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                         RowVector& refused) noexcept {
@@ -137,8 +140,8 @@ RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowV
   return done;
 }
 
-// A contact balances the force that presses a voxel against its obstacle or the tool; the cells above get a
-// boundary spring.
+// Takes the force that presses a voxel against its obstacle or the tool out of the residual, because the
+// contact balances it. The cells above the voxel get a boundary spring.
 void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                  RowResidual& found, RowVector& out) noexcept {
   const double touching = kTouching * lattice_.min_spacing_m();
@@ -235,7 +238,7 @@ void Multigrid::for_tilted(int level, RowId row, const LevelRow& r, LaneSpan spa
   }
 }
 
-// Smooths cells on inclined surfaces, whose axes are coupled: each moves to its least energy.
+// Smooths cells on inclined surfaces, whose axes are coupled. Each cell moves to its least energy.
 float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan span) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();
@@ -245,7 +248,7 @@ float Multigrid::smooth_tilted(int level, RowId row, const LevelRow& r, LaneSpan
       [&](VoxelId cell, std::size_t i, const std::array<float, 3>& tilt, const std::array<float, 3>& hold) {
         const VoxelSprings springs = l.couplings->springs_of(cell);
         glm::dmat3 stiffness(0.0);  // double: a float may not hold the determinant
-        glm::dvec3 pull(0.0);       // from where the boundary spring is fixed
+        glm::dvec3 pull(0.0);       // force on the cell at the place where its boundary spring is fixed
         for (int axis = 0; axis < 3; ++axis) {
           const auto ua = static_cast<std::size_t>(axis);
           const float prolonged = r.held_at[ua][i];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A log of rows written since clear(), each once, by level.
+// A log of the rows written since clear(). It lists each row once, by level.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace voxel {
 
 class ChangeLog {
  public:
-  // Starts the log, for so many rows on each level; allocates. Before, nothing is noted.
+  // Starts the log. `rows`: number of rows on each level. Allocates. Before this call nothing is noted.
   void begin(std::span<const std::size_t> rows) {
     levels_.clear();
     for (const std::size_t n : rows) levels_.push_back({LazyArray<std::uint8_t>(n), LazyArray<RowId>(n), 0});
@@ -30,7 +30,7 @@ class ChangeLog {
   [[nodiscard]] bool has(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].noted[row] != 0;
   }
-  // In the order in which they were first written.
+  // The rows, in the order in which they were first written.
   [[nodiscard]] std::span<const RowId> rows(int level) const {
     const Level& l = levels_[static_cast<std::size_t>(level)];
     return {l.rows.data(), l.count};

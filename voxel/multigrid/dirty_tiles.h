@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A queue of tiles of voxels that are to be relaxed: first in, first out, each once.
+// A first-in, first-out queue of tiles of voxels that are to be relaxed. It holds each tile at most once.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +29,8 @@ class TileQueue {
 
   [[nodiscard]] std::size_t tiles() const { return waits_.size(); }
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
-  // Something moved in this row (Grid::row_coordinates): queues its tile, and the tiles beside it if the row
-  // is at their border.
+  // Call when something moved in this row (Grid::row_coordinates). Queues the row's tile, and the tiles
+  // beside that if the row is at the tile's border.
   void mark_dirty(const std::array<int, 3>& row) noexcept {
     const int column = row[0] - 1, j = row[1], k = row[2];
     push(column, j, k);

@@ -12,14 +12,15 @@ namespace voxel {
 namespace {
 
 constexpr int kMaxLevels = 10;
-constexpr int kSmallest = 3;  // cells across the coarsest level
+constexpr int kSmallest = 3;  // most cells along an axis of the coarsest level
 // From this level on springs are written on construction.
 constexpr int kWrittenAtOnce = 5;
-constexpr std::size_t kMaxFrozen = 4096;  // rows; the contact of a tool has some hundred
-// Rows that a tick adds together.
+// Most rows with a frozen residual; the contact of a tool has some hundred.
+constexpr std::size_t kMaxFrozen = 4096;
+// Most rows that a tick adds in one batch.
 constexpr std::size_t kMostInTick = 1024;
 constexpr std::uint8_t kAllAxes = 7;
-// Active limits of all levels at a time; what exceeds them still moves.
+// Most active limits on all levels together. Voxels and cells beyond that number still move.
 constexpr std::size_t kMaxStopped = 65536;
 
 }  // namespace
@@ -45,7 +46,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
     level.stopped = LazyArray<std::uint8_t>(g.size());
     level.flags = LazyArray<std::uint8_t>(g.rows());
     levels_.push_back(std::move(level));
-    // One coarse level at least: it is where residuals are measured.
+    // There is at least one coarse level, because residuals are measured on the way to it.
     if (levels() > 1 && *std::max_element(g.dims.begin(), g.dims.end()) <= kSmallest) break;
   }
   for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
@@ -113,8 +114,9 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
   if (level == 0 && (flags & active) != 0) tiles_.mark_dirty(g.row_coordinates(row));
 }
 
-// A row moved by `change`. A change too small for a sweep is still restricted: small forces on many voxels
-// add up to a large one on the cell above, four times as large on each level.
+// Notes that a row moved by `change`. A change too small for a sweep is still restricted, because small
+// forces on many voxels add up to a large one on the cell above. That force is four times as large on each
+// coarser level.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
   if (change <= restricted_m()) return;
   if (level == 0) bricks_.look_at(row);

@@ -44,9 +44,9 @@ class Multigrid {
     active = 1,    // its residual may be above the tolerance
     dirty = 2,     // it, or a row beside it, changed since it was last restricted
     changed = 4,   // (coarse) it has a pending correction
-    renewed = 8,   // (coarse) its values were restricted, its load is still to be
+    renewed = 8,   // (coarse) its values were restricted, but its load was not yet
     source = 16,   // (coarse) it prolongs its correction in the current cycle
-    limited = 32,  // an active limit holds something in it
+    limited = 32,  // an active limit holds a voxel or cell of it
   };
   [[nodiscard]] bool has(int level, RowId row, std::uint8_t flag) const {
     return (at(level).flags[row] & flag) != 0;
@@ -80,15 +80,15 @@ class Multigrid {
   void set_boundary_scale(float times) noexcept { boundary_scale_ = times; }
   // Releases all limits that are active, and the cells above them.
   void release_active() noexcept;
-  // Releases active limits unless a voxel is still pulled against its limit.
+  // Releases the active limits that no voxel pulls against any more.
   void release_inactive(const Displacement& state) noexcept;
-  // If set, residuals against active limits are restricted, too: for tissue that a wave has just laid at its
-  // limits and that is to open altogether.
+  // If set, residuals against active limits are restricted, too. This is for tissue that a wave has just
+  // brought to its limits, and that has to leave them all together.
   void restrict_all(bool all) noexcept { restricts_all_ = all; }
-  // Sets the force of active limits on a voxel (N), until it is set anew. It balances the springs' force, and
-  // the cells above the voxel do not move.
+  // Sets the force of active limits on a voxel (N), until it is set again. The force balances that of the
+  // springs, and the cells above the voxel do not move.
   void set_limit_load(VoxelId v, const glm::vec3& force_N) noexcept;
-  // Active limits of voxels: `visit(v, axis)` for each axis on which a limit holds v.
+  // Calls visit(v, axis) for each axis on which an active limit holds voxel v.
   template <class Visit>
   void for_active(const Visit& visit) const {
     for (const StoppedCell& s : stopped_) {
@@ -105,31 +105,34 @@ class Multigrid {
   // Renews the plastic part of a row's load; `keep`: commits the plastic offsets. True if a link is beyond
   // its committed offset.
   bool update_plasticity(RowId row, Displacement& state, bool keep) noexcept;
-  // rows_below(): children of a coarse row (bit 0: in x, 1: in y, 2: in z) on the finer level; beyond the
-  // lattice, rows of its empty border. fetch() prefetches a row's values; any number is allowed.
+  // fetch() prefetches a row's values; any row number is allowed. rows_below() lists the children of a coarse
+  // row on the finer level. Bits 0 to 2 of their index select the upper child along x, y and z. Children
+  // beyond the lattice are rows of its empty border.
   void fetch(int level, RowId row, const Displacement& state) const noexcept;
   [[nodiscard]] std::array<RowId, 8> rows_below(int level, RowId row) const noexcept;
 
   // The functions below work on the Float8 of `span`; by default on the whole row.
 
-  // Smooths a row: moves its voxels or cells to the minimum of their energy within their limits, all other
-  // rows fixed, every second one first.
+  // Smooths a row: moves every second voxel or cell, then the others, each to the minimum of its energy
+  // within its limits. All other rows stay fixed.
   void smooth(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
               LaneSpan span = {}) noexcept;
-  // Restricts values: a coarse cell takes the mean of its children plus its pending correction …
+  // Restricts values: the value of a coarse cell becomes the mean of its children plus its pending
+  // correction.
   void restrict_values(int level, RowId row, Displacement& state, LaneSpan span = {}) noexcept;
-  // … and the load under which the children would be at rest where they are. Returns the largest residual on
-  // the finer level (N); for level 1 it is one of voxels. For whole rows it also finds which are at rest.
+  // Restricts loads: a coarse cell gets the load under which its children would be at rest where they are.
+  // Returns the largest residual on the finer level (N); for level 1 it is one of voxels. If the span is the
+  // whole row, it also finds which finer rows are at rest.
   float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        LaneSpan span = {}) noexcept;
   // Prolongs pending corrections of coarse rows marked `source` to the rows of a box (see prolongation.h),
-  // from plane to plane. The part of a correction that links at their limits refuse is subtracted from the
-  // cells again: otherwise cells would pull at their neighbours more and more. `jointly`: all voxels move
-  // together (limited_correction.h), for tissue that has far to go and is in its own way row by row.
+  // plane by plane. The part of a correction that links at their limits refuse is subtracted from the cells
+  // again. Otherwise cells would pull at their neighbours more and more. `jointly`: all voxels move together
+  // (limited_correction.h). This is for tissue that has far to go and whose rows would block one another.
   struct ProlongedBox {
     int q0, q1, j0, j1, k0, k1;     // Float8 and rows of the level, inclusive
     int first_source, last_source;  // cells of the next coarser level along x that prolong
-    int from_k, to_k;  // planes of this call; the box's planes come in order, and no other box in between
+    int from_k, to_k;  // planes of this call; calls for one box follow each other in the order of planes
   };
   void prolong(int level, const ProlongedBox& box, Displacement& state, const ObstacleView& obstacles,
                bool jointly = false) noexcept;
@@ -146,7 +149,7 @@ class Multigrid {
   // `motion_tolerance_m`.
   [[nodiscard]] float motion_tolerance_m() const { return motion_tolerance_m_; }
   [[nodiscard]] float tolerance_N() const { return tolerance_N_; }
-  // Smaller changes are not passed to other levels.
+  // Smaller changes are neither restricted nor prolonged (m).
   [[nodiscard]] float restricted_m() const { return motion_tolerance_m_ / 32.0F; }
   void set_motion_tolerance(float tolerance_N, float motion_tolerance_m) noexcept {
     tolerance_N_ = tolerance_N;
@@ -163,8 +166,9 @@ class Multigrid {
   [[nodiscard]] bool tool_presses_block(std::size_t block) const {
     return block_state_[block].by_tool.count > 0;
   }
-  // Force of springs and loads on a block (N), and its frozen residual.
+  // Force of springs and loads on a block (N).
   [[nodiscard]] glm::dvec3 block_force(std::size_t block, const Displacement& state) const noexcept;
+  // Load that freezes the residual of a block (N): its force when it was frozen, negated.
   [[nodiscard]] glm::dvec3 residual_of_block(std::size_t block) const noexcept {
     return block_state_[block].frozen_N;
   }
@@ -174,9 +178,9 @@ class Multigrid {
                                                      const Displacement& state) const noexcept;
   // Adds an interval to `bounds`, which has room for six more.
   static void add_bounds(const AdmissibleInterval& room, std::vector<BlockBound>& bounds);
-  // Moves a block by `way` as far as its links and obstacles allow; returns how far it moved. Where the tool
-  // presses it, it slides on the tool, unless the caller handles the tool. Results of another solver are not
-  // logged.
+  // Moves a block by `way` as far as its links and obstacles allow, and returns its motion (m). A block that
+  // the tool presses slides on the tool, unless the caller handles the tool. Use Note::unlogged for results
+  // of another solver.
   enum class Tool : std::uint8_t { constrains, caller_handles };
   enum class Note : std::uint8_t { logged, unlogged };
   glm::dvec3 move_block(std::size_t block, const glm::dvec3& way, Displacement& state,
@@ -185,8 +189,10 @@ class Multigrid {
   // Moves the blocks that meet a box of a level to the equilibrium of their border's springs.
   void smooth_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                      const ObstacleView& obstacles) noexcept;
-  // measure_blocks() finds the residuals of the blocks, before the coarser level's loads; load_blocks() finds
-  // their own loads there, afterwards. Returns the largest residual per voxel (N), for level 0 only.
+  // measure_blocks() finds the residuals of the blocks; call it before the coarser level's loads are
+  // restricted. load_blocks() finds the blocks' own loads on the coarser level; call it afterwards. For level
+  // 0, measure_blocks() returns the largest residual of a block, divided by the root of its number of border
+  // links (N).
   float measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                        const ObstacleView& obstacles) noexcept;
   void load_blocks(int level, const RigidBlocks::Box& box) noexcept;
@@ -202,7 +208,7 @@ class Multigrid {
   // Sets coarse cells of logged rows to 0.
   void drop_coarse() noexcept;
   [[nodiscard]] std::size_t rows_to_drop() const noexcept;
-  // The same, and no residual is frozen any more.
+  // As drop_coarse(). Afterwards no residual is frozen any more.
   void restart() noexcept;
   // Freezes the residual of a row: its voxels count as at rest where they are.
   void freeze_residual(RowId row, Displacement& state, const ObstacleView& obstacles,
@@ -215,7 +221,7 @@ class Multigrid {
     const float* at = of_row + v % kRow;
     return {at[0] - own[0], at[kRow] - own[1], at[2 * kRow] - own[2]};
   }
-  // Keeps this part of the frozen residuals.
+  // Scales the frozen residuals by `part`.
   void keep_frozen_residual(float part, const Displacement& state) noexcept;
   // Load of a row with a frozen residual on one axis, the voxels' own load included; null: its residual is
   // not frozen.
@@ -226,12 +232,12 @@ class Multigrid {
   // Adds motion that another solver found to a row, as far as its links allow.
   void add_motion(RowId row, const RowVector& way, Displacement& state,
                   const ObstacleView& obstacles) noexcept;
-  // The same for many rows together: each goes as far as its links to the others' new places allow. A row is
-  // added once. If can_batch() is false (obstacles nearby, or too many rows) use add_motion().
+  // The same for many rows together: each goes as far as its links to the others' new places allow. Add each
+  // row once. If can_batch() is false (obstacles nearby, or too many rows), use add_motion().
   [[nodiscard]] bool can_batch(RowId row, const Displacement& state) noexcept {
     return prepare(0, row) && state.row_obstacles[row] == 0 && !limited_correction_.full();
   }
-  // `fill(way)` writes the row's motion.
+  // Adds a row to the batch; `fill(way)` writes its motion.
   template <class Fill>
   void batch(RowId row, Displacement& state, const Fill& fill) noexcept {
     LimitedCorrection::Row& r = limited_correction_.add(row, {});
@@ -239,7 +245,8 @@ class Multigrid {
     set_out(r, state);
   }
   void move_batch(Displacement& state) noexcept { apply_limited_correction(state); }
-  // Was the row added? Then `left` is what is left of its motion (m), and `gone` whether nothing is.
+  // True if the row was added. Then `left` is the rest of its motion (m), and `gone` tells whether nothing is
+  // left.
   [[nodiscard]] bool batched(RowId row, const Displacement& state, RowVector& left,
                              bool& gone) const noexcept {
     const LimitedCorrection::Row* r = limited_correction_.find(row);
@@ -256,8 +263,8 @@ class Multigrid {
   struct Level {
     std::unique_ptr<LevelStiffness> couplings;
     // [axis][cell] of coarse levels. `prolonged` is the part of the value that the finer level knows, so
-    // value − prolonged is the pending correction. `loaded_at` is `prolonged` when the load was found:
-    // boundary springs pull from there.
+    // value − prolonged is the pending correction. `loaded_at` is the value of `prolonged` when the load was
+    // found. Boundary springs pull towards it.
     std::array<LazyArray<float>, 3> value, prolonged, load, loaded_at;
     LazyArray<std::uint8_t> stopped;  // [cell or voxel] bits 0 to 2: an active limit holds it on that axis
     LazyArray<std::uint8_t> flags;    // [row]
@@ -277,7 +284,7 @@ class Multigrid {
     LaneSpan span;
     RowVector way;
   };
-  static constexpr float kLeastLoad = 0.25F;  // of the tolerance: smaller errors of a load are ignored
+  static constexpr float kLeastLoad = 0.25F;  // (unit: tolerance) smaller errors of a load are ignored
 
   // State of a block on one level.
   struct BlockOnLevel {
@@ -286,13 +293,13 @@ class Multigrid {
     glm::dvec3 load{0.0};                // (N)
     glm::dvec3 pending_correction{0.0};  // pending correction (m)
     glm::dvec3 sum{0.0};                 // sum of the corrections prolonged to its cells (m)
-    bool active = false;                 // in the current cycle
+    bool active = false;                 // its residual was measured in the current cycle
   };
   struct BlockState {
     std::vector<BlockOnLevel> on;  // [level]
-    HeldDirections by_tool, held;  // directions fixed by the tool; and by obstacles, too
+    HeldDirections by_tool, held;  // directions fixed by the tool; by the tool and by obstacles
     std::uint8_t stopped = 0;      // bits: axes on which a limit holds it
-    glm::dvec3 frozen_N{0.0};      // (N)
+    glm::dvec3 frozen_N{0.0};      // load that freezes its residual
   };
   static constexpr std::size_t kMaxBlockBounds = 1024;
 
@@ -325,7 +332,7 @@ class Multigrid {
                    RowVector& left) const noexcept;
   void take_back_refused(int level, const Refused& refused) noexcept;
 
-  // ---- where something is touched (contact_smoother.cpp) ----
+  // ---- contacts (contact_smoother.cpp) ----
   float smooth_voxels(const LevelRow& r, RowId row, Displacement& state, const ObstacleView& obstacles,
                       LaneSpan span) noexcept;
   RowCorrection correct_voxels(const LevelRow& r, RowId row, const RowVector& correction, Displacement& state,
@@ -379,7 +386,7 @@ class Multigrid {
   LimitedCorrection limited_correction_;
   // Rows with a frozen residual, and their loads (N) side by side, so that freezing touches few pages.
   LazyVector<RowId> frozen_rows_;
-  LazyArray<float> frozen_residual_;        // [as the list of rows][axis][lane]
+  LazyArray<float> frozen_residual_;        // [index into frozen_rows_][axis][lane]
   LazyArray<std::uint16_t> frozen_number_;  // [row] 1 + index; 0: not frozen
   std::unique_ptr<RigidBlocks> blocks_;     // null: there are no blocks
   std::vector<BlockState> block_state_;

@@ -79,7 +79,8 @@ std::array<RowId, 8> Multigrid::rows_below(int level, RowId row) const noexcept 
 
 namespace {
 
-// Float8 of the finer row `half` (0 or 1) below Float8 of a coarse row; none: first > last.
+// Float8 of finer row `half` (0 or 1) that lie below the given Float8 of a coarse row. Empty (first > last)
+// if there are none.
 LaneSpan octets_below(LaneSpan coarse, int half) {
   const int from = half * kLaneGroups / 2;
   return {2 * (std::max(coarse.first, from) - from),
@@ -183,7 +184,7 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
     }
   }
   // Active limits balance their residual. If it were restricted, coarse levels would push against links that
-  // do not yield, and the sweeps after would undo it.
+  // do not yield, and later sweeps would undo that.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < kRow && found.resisted[axis] >> i != 0; ++i) {
       if ((found.resisted[axis] >> i & 1U) != 0)
@@ -204,7 +205,7 @@ float Multigrid::restrict_loads(int level, RowId row, Displacement& state, const
     const int half = static_cast<int>(child & 1U);
     const LaneSpan below = octets_below(span, half);
     if (below.first > below.last || !finer.prepare(fine)) continue;
-    // blocks get theirs from their borders
+    // blocks get their residual from their borders
     if (blocks_ != nullptr && blocks_->fill_known_row(level - 1, fine)) {
       if (span.whole()) unmark(level - 1, fine, active | dirty);
       continue;

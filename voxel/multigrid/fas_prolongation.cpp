@@ -9,7 +9,7 @@ namespace voxel {
 
 namespace {
 
-constexpr int kRowsAhead = 4;  // rows
+constexpr int kRowsAhead = 4;  // rows along y that are prefetched
 
 }  // namespace
 
@@ -56,7 +56,8 @@ void Multigrid::forget_pending_correction(int level, RowId row, Displacement& st
   unmark(level, row, changed);
 }
 
-// Reads the pending corrections of one row of cells, all along x; they count as prolonged then.
+// Takes the pending corrections of one row of cells along all of the box, and interpolates them along x.
+// Afterwards they count as prolonged.
 void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box) noexcept {
   Level& l = at(level);
   const Grid& g = l.couplings->grid();

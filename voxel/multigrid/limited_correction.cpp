@@ -9,7 +9,7 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kAhead = 3;  // rows
+constexpr std::size_t kAhead = 3;  // rows that are prefetched
 
 }  // namespace
 

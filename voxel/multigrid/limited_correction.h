@@ -2,11 +2,12 @@
 // One correction for many rows of voxels under the limits of their links: rows move together, each as far as
 // the links to the others' new places allow.
 //
-// Row by row, a row could go no further than its links to rows that have not moved yet allow, and voxels that
-// active limits tie together would not move. So all rows move first. Rows beyond a limit then come back
-// towards their start until no link is violated. At the start none was, so one end of a violated link can
-// always come nearer to its start, and none turns round. Difference constraints are closed under minimum and
-// maximum: if all on an axis move the same way, the least that must comes back, whatever the order.
+// If rows moved one after another, links to rows that have not moved yet would stop them, and voxels that
+// active limits tie together would not move. So all rows move first. Then voxels with a link beyond its limit
+// come back towards their start until no link is violated. At the start no link was violated. So one end of a
+// violated link can always come nearer to its start, and no voxel turns round. Difference constraints are
+// closed under minimum and maximum. So if all voxels on an axis move the same way, they come back by the
+// least amount, whatever the order.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +24,7 @@ namespace voxel {
 
 class LimitedCorrection {
  public:
-  static constexpr std::size_t kMost = 65536;  // rows at a time
+  static constexpr std::size_t kMost = 65536;  // most rows at a time
 
   struct Row {
     RowId row = 0;
@@ -31,8 +32,8 @@ class LimitedCorrection {
     float most_m = 0.0F;  // largest motion asked of it
     bool asked = false;   // it is queued
     bool out = false;     // it has moved
-    bool cut = false;     // voxels that do not move were asked to
-    bool aims = false;    // its target differs from where it is
+    bool cut = false;     // voxels that do not move were asked to move
+    bool aims = false;    // its target is stored, because the row may miss it
     RowVector from;       // where it was; before it has moved, its motion (m)
   };
 
@@ -41,15 +42,15 @@ class LimitedCorrection {
   explicit LimitedCorrection(std::size_t rows);
 
   [[nodiscard]] bool full() const noexcept { return count_ == rows_.size(); }
-  // Takes the memory now for so many rows, `some` of which do not reach their targets.
+  // Takes the memory now for `rows` rows, of which `some` do not reach their targets.
   void populate(std::size_t rows, std::size_t some) noexcept {
     rows_.populate(std::min(rows, rows_.size()), {true});
     aims_.populate(std::min(some, aims_.size()), {true});
     ring_.populate(std::min(some, ring_.size()), {true});
     number_.populate();
   }
-  // Adds a row, once, unless full(). The caller writes its motion to `from`; lanes outside of the span do not
-  // move.
+  // Adds a row that was not added yet. Call only if not full(). The caller writes its motion to `from`; lanes
+  // outside of the span do not move.
   Row& add(RowId row, LaneSpan span) noexcept;
   void clear() noexcept;
   // Target of a row (m); kept for rows that did not reach it.
@@ -78,7 +79,7 @@ class LimitedCorrection {
   [[nodiscard]] std::size_t index(const Row& row) const noexcept { return number_[row.row] - std::size_t{1}; }
 
   LazyArray<Row> rows_;
-  LazyArray<RowVector> aims_;        // [as rows_]
+  LazyArray<RowVector> aims_;        // [index into rows_]
   LazyArray<std::uint32_t> number_;  // [row] 1 + index into rows_; 0: not added
   LazyArray<std::uint32_t> ring_;
   std::size_t count_ = 0, head_ = 0, tail_ = 0;

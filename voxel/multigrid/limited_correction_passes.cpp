@@ -9,15 +9,15 @@
 namespace voxel {
 namespace {
 
-// Visits per row, on average. More happen only if rounding drives a row back and forth; then all rows return
-// to their start.
+// Largest mean number of visits per row. More occur only if rounding drives a row back and forth. Then all
+// rows return to their start.
 constexpr std::size_t kMostVisits = 64;
 
 }  // namespace
 
-// Moves a row by the motion in `from`: held and anchored voxels stay; pressed voxels move along the tool's
-// tangent plane; a voxel that an active limit stops stays, and its motion becomes a target. A limit that cuts
-// one axis of a sliding voxel's motion takes it off the tool, or into it, by little, until the next
+// Moves a row by the motion in `from`. Held and anchored voxels stay. Pressed voxels move along the tool's
+// tangent plane. A voxel that an active limit stops stays, and its motion becomes a target. If a limit cuts
+// one axis of a sliding voxel's motion, the voxel leaves the tool or enters it by a little, until the next
 // projection.
 void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept {
   LevelRow row = row_of(0, r.row, state);
@@ -39,7 +39,7 @@ void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept
   }
   RowVector refused;
   r.out = true;
-  // links to other rows are checked when the second of both has moved
+  // a link to another row is checked when the second of the two rows has moved
   unsigned sides = 0, side = 1;
   for (const RowId to : beside(r.row)) {
     if (const LimitedCorrection::Row* other = limited_correction_.find(to); other != nullptr && other->out)
@@ -60,7 +60,7 @@ void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept
   }
 }
 
-// Call before anything keeps the row from its target.
+// Stores the row's present place as its target. Call before anything keeps the row from it.
 void Multigrid::keep_aim(LimitedCorrection::Row& r, const Displacement& state) noexcept {
   if (r.aims) return;
   r.aims = true;
@@ -90,7 +90,7 @@ void Multigrid::ask_round(RowId row) noexcept {
   for (const RowId to : beside(row)) limited_correction_.ask(to);
 }
 
-// Rows that do not move may hold one back, too.
+// A row that does not move may hold this row back, too.
 void Multigrid::look_at_others(const LimitedCorrection::Row& r, Displacement& state) noexcept {
   unsigned sides = 0, side = 1;
   for (const RowId to : beside(r.row)) {
@@ -126,8 +126,8 @@ void Multigrid::apply_limited_correction(Displacement& state) noexcept {
   for (const LimitedCorrection::Row& r : limited_correction_.rows()) note_change(0, r.row, r.most_m);
 }
 
-// The part of a row's motion that it did not make, of voxels that may move; returns the bits of the axes that
-// have any.
+// Sets `left` to the part of a row's motion that its movable voxels did not make. Returns the bits of the
+// axes that have any.
 unsigned Multigrid::left_of(const LimitedCorrection::Row& r, const Displacement& state,
                             RowVector& left) const noexcept {
   left = {};

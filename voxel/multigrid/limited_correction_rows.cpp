@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inner loops of a limited correction on one row (limited_correction.h), by Float8, as row_smoother.cpp.
+// Inner loops of a limited correction on one row (limited_correction.h), in Float8, as in row_smoother.cpp.
 #include "voxel/lattice/simd_dispatch.h"
 #include "voxel/multigrid/row_limits.h"
 #include "voxel/multigrid/row_smoother.h"
@@ -11,7 +11,7 @@ namespace {
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE bool draw_back_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis,
                                   const float* from) {
-  constexpr float kRounding = 2.4e-7F;  // of a displacement: two of its last bits
+  constexpr float kRounding = 2.4e-7F;  // (unit: displacement) two of its last bits
   const AxisSprings s(row.springs, axis);
   float* own = row.u[axis];
   Span u;
@@ -81,8 +81,8 @@ HYBRID_INLINE void take_largest_step(Float8& most, const std::array<Float8, kLan
   }
 }
 
-// Compares with the tightest limits, and takes missing neighbours for neighbours at rest: no spring is read.
-// `u`: without the lanes beside it along x.
+// True if a link may be beyond the tightest limits. Missing neighbours count as neighbours at rest, so that
+// no spring is read. Sets the lanes of `u` beyond both ends of the row.
 HYBRID_INLINE bool steps_beyond(Axes& u, const LevelRow& row, const RowLimits& limits, unsigned sides) {
   Mask8 beyond{};
 #pragma GCC unroll 1

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Prolongation buffer: two planes of coarse corrections, already interpolated along x.
 //
-// Corrections are prolonged trilinearly. Sixteen rows of voxels need each row of cells; so it is read and
-// interpolated along x once.
+// Corrections are prolonged trilinearly. Sixteen finer rows need each row of cells, so a row of cells is read
+// and interpolated along x only once.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ namespace voxel {
 class Prolongation {
  public:
   Prolongation() = default;
-  // For any box of this grid, the finer of two levels.
+  // Serves any box of `fine`, the grid of the finer of two levels. Allocates.
   explicit Prolongation(const Grid& fine);
 
   [[nodiscard]] std::size_t memory_bytes() const {
@@ -31,14 +31,14 @@ class Prolongation {
   [[nodiscard]] int first() const { return first_; }
   [[nodiscard]] int groups() const { return groups_; }
 
-  // The cells of a row before interpolation, from coarse Float8 first() on: `which` 0 to 2 is the axis; 3 is
-  // 1 for each cell that exists, else 0. The Float8 before and after are writable, too.
+  // The cells of a row before interpolation, from coarse Float8 first() on. `which` 0 to 2 is the axis.
+  // `which` 3 holds 1 for each cell that exists, else 0. The Float8 before and after are writable, too.
   [[nodiscard]] float* cells(std::size_t which) noexcept {
     return cells_.data() + which * cell_lanes_ + kLanes;
   }
   // Interpolates cells() along x. `whole`: every cell exists.
   void spread(int j, int k, bool is_source, bool whole) noexcept;
-  // A row of lanes of the finer level, from its Float8 number `octet` along x on.
+  // A row of lanes of the finer level, from its Float8 number `group` along x on.
   [[nodiscard]] ProlongedRow row(int j, int k, int group) const noexcept {
     const std::size_t at = slot(j, k);
     const float* lanes =

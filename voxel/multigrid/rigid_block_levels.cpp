@@ -13,8 +13,9 @@
 
 namespace voxel {
 
-// Residual of a row that is restricted for blocks: 0 for a block that the coarser level knows, which gets it
-// as a whole; for others an equal share for each of its cells.
+// Sets the residual that the cells of blocks in a row restrict. It is 0 for a block that the coarser level
+// knows, because that level gets the block's residual as a whole. It is 0 for a block that sprawls. For other
+// blocks it is an equal share for each cell.
 void Multigrid::set_block_lanes(int level, RowId row, LaneSpan span, RowVector& out) const noexcept {
   for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = blocks_->of(level, row * kRow + static_cast<VoxelId>(i));

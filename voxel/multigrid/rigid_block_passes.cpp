@@ -15,7 +15,7 @@ namespace voxel {
 namespace {
 
 constexpr double kRounding = 1.2e-7;   // last bit of a float, relative
-constexpr double kNearObstacle = 2.0;  // spacings: obstacles further away are skipped
+constexpr double kNearObstacle = 2.0;  // (unit: spacing) obstacles further away are skipped
 constexpr std::uint32_t kAllLanes = ~std::uint32_t{0};
 // How far the voxel of a block at a link's end may move on an axis before the link stops it: {down, up}.
 std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state, const RigidBlocks::Link& l,
@@ -27,7 +27,8 @@ std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state,
              apart = std::max(0.0, static_cast<double>(bounds[1] - difference));
   return l.up ? std::array<double, 2>{apart, closer} : std::array<double, 2>{closer, apart};
 }
-// How much further, if the voxel at the link's other end comes along as far as its other links allow.
+// How much further the block's voxel may move if voxel v at the link's other end comes along as far as v's
+// other links allow.
 double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v, std::uint16_t block,
                    int axis, bool upwards) {
   if (state.role[v] != Displacement::free || lattice.anchored(v)) return 0.0;
@@ -44,7 +45,7 @@ double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v,
   }
   return std::max(0.0, static_cast<double>(room));
 }
-// Is it the first of the links between a voxel and the block?
+// True if `l` is the first of the links between its outer voxel and the block.
 bool first_link(const Lattice& lattice, const RigidBlocks::Link& l, std::uint16_t block) {
   for (int d = 0; d < l.d; ++d) {
     if (lattice.block(lattice.up(l.beside, d)) == block || lattice.block(lattice.down(l.beside, d)) == block)
@@ -84,7 +85,7 @@ glm::dvec3 Multigrid::block_force(std::size_t block, const Displacement& state) 
   return force;
 }
 
-// Interval that all links of the border leave the block; `room(link, axis)`: {down, up}.
+// Interval that all links of the border leave the block. `room(link, axis)` gives {down, up} for one link.
 template <class Room>
 Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t block, const Room& room) const noexcept {
   constexpr double kUnlimited = 1e30;
@@ -134,7 +135,7 @@ void Multigrid::shift_block(std::size_t block, const glm::dvec3& way, Displaceme
   for (const RigidBlocks::Run& run : blocks_->on(0, block).rows) note_change(0, run.row, most);
 }
 
-// Bounds by obstacles that the block touches or may reach.
+// Sets block_bounds_: bounds by the tool, and by obstacles that the block touches or may reach.
 void Multigrid::stop_at_obstacles(std::size_t block, const Displacement& state, const ObstacleView& obstacles,
                                   Tool tool) noexcept {
   block_bounds_.clear();
@@ -153,8 +154,8 @@ void Multigrid::stop_at_obstacles(std::size_t block, const Displacement& state, 
   }
 }
 
-// As interval_of_block(), if voxels beside the block come along as far as their other links allow; searched
-// in the direction of `way` only.
+// As interval_of_block(), but voxels beside the block come along as far as their other links allow. This is
+// searched in the direction of `way` only.
 Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t block, const glm::dvec3& way,
                                                           const Displacement& state) const noexcept {
   const auto number = static_cast<std::uint16_t>(block + 1);
@@ -185,8 +186,8 @@ void Multigrid::take_others_along(std::size_t block, Displacement& state) noexce
   }
 }
 
-// Voxels that links at their limits keep from moving away come along with the block: adds their forces.
-// Returns the bits of the axes on which the block is held nevertheless.
+// Links at their limits tie some voxels to the block, so that they come along with it. Adds the forces of
+// these voxels to `pull`. Returns the bits of the axes on which the block is held nevertheless.
 std::uint8_t Multigrid::add_what_comes_along(std::size_t block, const Displacement& state,
                                              glm::dvec3& pull) noexcept {
   const double tight = static_cast<double>(kAtLimit) * lattice_.min_spacing_m();
@@ -220,7 +221,7 @@ glm::dvec3 Multigrid::move_block(std::size_t block, const glm::dvec3& way, Displ
   const AdmissibleInterval room = room_with_others(block, way, state);
   add_bounds(room, block_bounds_);
   glm::dvec3 to = move_within(stiffness * way, stiffness, block_bounds_);
-  for (int axis = 0; axis < 3; ++axis) {  // rounding
+  for (int axis = 0; axis < 3; ++axis) {  // removes rounding
     const auto& of_axis = room[static_cast<std::size_t>(axis)];
     to[axis] = std::clamp(to[axis], of_axis[0], of_axis[1]);
   }
@@ -251,6 +252,7 @@ void Multigrid::shift_cells(int level, std::size_t block, const glm::dvec3& way)
 }
 
 // Force and stiffness of a block on a level: springs of its border, boundary springs of its cells, its load.
+// On level 0 the force is only the load that freezes the block's residual.
 glm::dvec3 Multigrid::block_pull(int level, std::size_t block, glm::dvec3& stiffness) noexcept {
   const RigidBlocks::OnLevel& on = blocks_->on(level, block);
   stiffness = on.stiffness;
@@ -264,8 +266,8 @@ glm::dvec3 Multigrid::block_pull(int level, std::size_t block, glm::dvec3& stiff
           along(link.spring, axis, link.d) * static_cast<double>(value[link.beside] - value[link.cell]);
     }
   }
-  // If the tool or an obstacle holds the block, its cells have boundary springs because of that; they would
-  // hold it along the surface, too.
+  // If the tool or an obstacle holds the block, its cells have boundary springs for that reason. These
+  // springs would hold the block along the surface, too.
   if (block_state_[block].held.count > 0 || blocks_->sprawls(block)) return pull;
   for (const RigidBlocks::Run& run : on.rows) {
     if (!boundary_springs_->any(level, run.row) || !prepare(level, run.row)) continue;
@@ -344,7 +346,8 @@ float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displace
     on.active = true;
     block.on[static_cast<std::size_t>(level) + 1].passed = on.left;
     if (level > 0 || of.border.empty()) return;
-    // Per border link, because each force may be off by the tolerance; less the rounding of its displacement.
+    // The residual is measured per border link, because the force of each link may be off by the tolerance.
+    // The rounding of the displacement is subtracted.
     const glm::dvec3 bit = kRounding * glm::abs(state.at(of.border.front().cell)) * stiffness;
     const double left = std::max(0.0, glm::length(on.left) - glm::length(bit));
     worst = std::max(worst, static_cast<float>(left / std::sqrt(static_cast<double>(of.border.size()))));

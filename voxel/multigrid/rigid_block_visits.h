@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visits of the cells and blocks of a level; for the passes of rigid blocks alone.
+// Loops over the cells and blocks of a level, for the passes of rigid blocks only.
 #pragma once
 
 #include "voxel/multigrid/fas.h"
 
 namespace voxel {
 
-// `visit(cell, lane)` for the cells of a block in a run.
+// Calls visit(cell, lane) for the cells of a block in a run.
 template <class Visit>
 void for_cells(const RigidBlocks::Run& run, const Visit& visit) {
   for (std::uint32_t lanes = run.lanes; lanes != 0; lanes &= lanes - 1) {

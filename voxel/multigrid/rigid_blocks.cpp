@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which voxels and cells form a rigid block on each level, and its border; motion of a block within bounds.
+// Voxels and cells of a rigid block on each level, and its border; motion of a block within bounds.
 #include "voxel/multigrid/rigid_blocks.h"
 
 #include <algorithm>
@@ -11,13 +11,13 @@ namespace voxel {
 namespace {
 
 constexpr int kMostRounds = 200;
-constexpr double kSettled = 1e-9;  // of a bound's largest force: a smaller change ends the ascent
-// If less than this part of a block's voxels lies in cells of which it is at least half, that level and all
-// coarser ones do not know the block. With the force of the whole block on the springs of a few cells it
-// would move much too far there.
+constexpr double kSettled = 1e-9;  // (unit: largest force of a bound) a smaller change ends the ascent
+// A level knows a block if at least this share of the block's voxels lies in cells of which the block is at
+// least half. Otherwise that level and all coarser ones do not know it: there the force of the whole block
+// would act on the springs of a few cells, and the block would move much too far.
 constexpr double kMostOf = 0.7;
-constexpr int kCompact = 1;         // cells from the first to the last
-constexpr double kParallel = 1e-4;  // sin² of the angle: a direction within those already fixed
+constexpr int kCompact = 1;  // largest distance between cells of a compact block on an axis (unit: cell)
+constexpr double kParallel = 1e-4;  // sin² of the angle below which a direction counts as already fixed
 
 VoxelId above(const Grid& finer, const Grid& coarser, VoxelId cell) {
   const std::array<int, 3> c = finer.coordinates(cell);
@@ -107,7 +107,8 @@ void RigidBlocks::find_voxels() {
   }
 }
 
-// From the shares of cells on the finer level to those on this one.
+// Finds the blocks' cells on a level. `shares` and `filled` belong to the finer level before, and to this
+// level afterwards.
 void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
                              std::vector<std::uint32_t>& filled) {
   const Grid &finer = couplings_[static_cast<std::size_t>(level - 1)]->grid(),
@@ -137,7 +138,7 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
       all += s.voxels;
       if (2 * s.voxels >= filled[s.cell] && l.number[s.cell] == 0) known += s.voxels;
     }
-    if (of.empty()) continue;  // unknown from a finer level on
+    if (of.empty()) continue;  // unknown since a finer level
     if (kMostOf * static_cast<double>(all) > static_cast<double>(known)) {
       sprawls_[p] = compact(grid, of) ? 0 : 1;
       of.clear();
@@ -155,7 +156,7 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
   }
 }
 
-// Are its cells so few that all of them move nearly alike?
+// True if the cells of a block are so few that all of them move nearly alike.
 bool RigidBlocks::compact(const Grid& grid, const std::vector<Share>& shares) {
   std::array<int, 3> low{}, high{};
   for (const Share& s : shares) {

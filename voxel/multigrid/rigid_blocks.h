@@ -2,15 +2,17 @@
 // Rigid blocks: components of an object whose links have no slack (Lattice::block), on every level of the
 // multigrid hierarchy.
 //
-// Such a component can only be displaced as a whole: it has three unknowns, however many voxels it has. Voxel
-// by voxel it would never move. So its voxels do not move when rows are relaxed, and the block moves, as one,
-// to the equilibrium of its border's springs. On a coarse level a block consists of the cells of which it is
-// at least half; these move as one, too, and their correction is prolonged as that of any other cells.
+// Such a component can only be displaced as a whole: it has three unknowns, however many voxels it has. It
+// would never move if its voxels moved one at a time. So its voxels do not move when rows are relaxed, and
+// the block moves, as one, to the equilibrium of its border's springs. On a coarse level a block consists of
+// the cells of which it is at least half. These move as one, too, and their correction is prolonged as that
+// of any other cells.
 //
-// A block that has too little in such cells is unknown to that level and to all coarser ones. It takes the
-// mean of the corrections prolonged to its voxels. That is right if it lies in three cells along an axis at
-// most. A block that sprawls further (a thin sheet, a scaffold) connects tissue that such levels take for
-// separate. They do not move it, and it is fixed for the cells around it (boundary_springs.h).
+// A block that has too few voxels in such cells is unknown to that level and to all coarser ones. It takes
+// the mean of the corrections prolonged to its voxels. That is right if the block lies in at most two cells
+// of that level along each axis. A block that sprawls further (a thin sheet, a scaffold) connects tissue that
+// such levels take for separate. They do not move it, and it is fixed for the cells around it
+// (boundary_springs.h).
 #pragma once
 
 #include <array>
@@ -100,9 +102,9 @@ class RigidBlocks {
   [[nodiscard]] bool fill_known_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] == kFilledKnown;
   }
-  // Is it fixed for coarse levels that do not know it?
+  // Is the block fixed for coarse levels that do not know it?
   [[nodiscard]] bool sprawls(std::size_t block) const { return sprawls_[block] != 0; }
-  // Voxels of the block with loads besides their springs: bricks, or plastic links, of tissue beside it.
+  // Voxels of the block with loads besides their springs: from bricks or plastic links of tissue beside it.
   [[nodiscard]] const std::vector<VoxelId>& loaded(std::size_t block) const { return loaded_[block]; }
   // Surface numbers of its surface voxels.
   [[nodiscard]] const std::vector<std::uint32_t>& surface(std::size_t block) const { return surface_[block]; }
@@ -115,7 +117,7 @@ class RigidBlocks {
   struct Level {
     std::vector<OnLevel> blocks;
     LazyArray<std::uint16_t> number;  // [cell]; empty on level 0
-    std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled: and no others
+    std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled: has no other cells
   };
   static constexpr std::uint8_t kFilled = 2, kFilledKnown = 3;
   // A cell, and how many voxels of one block it holds.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether links of a row come near their limits.
+// Test whether links of a row come near their limits.
 #include "voxel/multigrid/row_kernels.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inside of the row passes: the interval that links allow, and whether limits have to be looked at.
+// Internal to the row passes: the interval that links allow, and tests whether limits have to be applied.
 #pragma once
 
 #include <algorithm>
@@ -27,11 +27,11 @@ constexpr bool clamps(Limits l) {
   return l != Limits::none;
 }
 
-// Limits of one axis of a row. If lanes have their own: `low[d]` and `high[d]` of the links up and down.
+// Limits of one axis of a row. If each lane has its own, the arrays hold them by d for the links up and down.
 struct AxisBounds {
   AxisLimits row;
   std::array<const float*, 3> up_low{}, up_high{}, down_low{}, down_high{};
-  std::array<float, 3> sign{};  // of low: across, the lower limit is the upper one, negated
+  std::array<float, 3> sign{};  // factor of low: −1 across, where the lower limit is the upper one negated
 
   AxisBounds(const RowLimits& limits, std::size_t axis) : row((*limits.of)[axis]) {
     if (limits.lanes == nullptr) return;
@@ -47,7 +47,7 @@ struct AxisBounds {
   }
 };
 
-// Intersects an interval with the limits of the links in d to the neighbours at `up` and `down`.
+// Intersects an interval with the limits of the links along d to the neighbours at `up` and `down`.
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void narrow(Interval& in, const Float8& up, const Float8& down, const AxisSprings& s,
                           const AxisBounds& b, std::size_t d, int group) {
@@ -87,14 +87,15 @@ HYBRID_INLINE void narrow_beside(Interval& in, const Around& at, const AxisSprin
   narrow<kUniform, kLimits>(in, at.y_up, at.y_down, s, b, 1, group);
   narrow<kUniform, kLimits>(in, at.z_up, at.z_down, s, b, 2, group);
 }
-// An interval can only be empty by rounding: the voxel stays where it is then.
+// Clamps `wanted` to an interval. An interval can only be empty by rounding; then the voxel stays where it
+// is.
 HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& now) {
   take_largest(wanted, in.low);
   take_least(wanted, in.high);
   wanted = in.low > in.high ? now : wanted;
 }
-// [d] of an axis: difference across a link below which its limits need not be looked at; a little less than
-// the tightest of them allows.
+// [d] Bound of the difference across a link, a little below the tightest limit of the row. Below it the
+// limits of the link need no check.
 struct Band {
   std::array<float, 3> most;
 
@@ -106,7 +107,7 @@ struct Band {
     }
   }
 };
-// Marks lanes with a link beyond the band, if the Float8 stood at `own`.
+// Marks lanes that would have a link beyond the band if the Float8 stood at `own`.
 template <bool kUniform>
 HYBRID_INLINE void note_beyond(Mask8& beyond, const Float8& own, const Float8& x_down, const Float8& x_up,
                                const Around& at, const AxisSprings& s, const Band& band, int group) {
@@ -163,7 +164,7 @@ HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x
   }
 }
 
-// The same, if each lane has its own limits.
+// As look_beyond(), if each lane has its own limits.
 HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Float8& x_down,
                                      const Float8& x_up, const LevelRow& row, const RowLimits::Written& w,
                                      std::size_t axis, int group) {
@@ -188,11 +189,12 @@ HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Flo
   }
 }
 
-// How links are compared with limits: all with the tightest ones, missing neighbours taken for neighbours at
-// rest, so that no spring is read; the same only where there is a link; each link with its own.
+// How links are compared with limits. `tightest`: all with the tightest limits; missing neighbours count as
+// neighbours at rest, so that no spring is read. `linked`: the same, but only where there is a link. `lanes`:
+// each link with its own limits.
 enum class Beyond : std::uint8_t { tightest, linked, lanes };
 
-// True if any Float8 has such a link.
+// Marks the lanes that have a link beyond these limits, by axis. True if there is any.
 template <Beyond kBeyond>
 HYBRID_INLINE bool look_at_axes(std::array<Mask8, 3>& beyond, const Axes& u, const LevelRow& row,
                                 const RowLimits& limits, const std::array<Band, 3>& band, LaneSpan span) {
@@ -217,8 +219,8 @@ HYBRID_INLINE bool look_at_axes(std::array<Mask8, 3>& beyond, const Axes& u, con
   return any(all);
 }
 
-// Bits of the axes that may have links beyond the band if the row stood at `u`. Cheap tests come first: most
-// rows have none.
+// Bits of the axes that may have links beyond the band if the row stood at `u`. Cheap tests come first,
+// because most rows have no such link.
 template <bool kUniform>
 HYBRID_INLINE unsigned beyond_band(const Axes& u, const LevelRow& row, const RowLimits& limits, LaneSpan span,
                                    float tight) {

@@ -11,7 +11,7 @@
 namespace voxel {
 namespace {
 
-// Smooths one axis of a row near its limits; cells have none.
+// Smooths one axis of a row of voxels near its limits. (Cells have no limits.)
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE void smooth_axis(const LevelRow& row, const AxisBounds& bounds, std::size_t axis, LaneSpan span,
                                Float8& most) {
@@ -159,7 +159,7 @@ HYBRID_INLINE unsigned smooth_freely(const LevelRow& row, const RowLimits* limit
   return beyond;
 }
 
-// First without limits, then again with them on axes that come near one.
+// Smooths all axes without limits first. Axes that come near a limit are then smoothed again with limits.
 template <bool kUniform, Limits kLimits>
 HYBRID_INLINE float smooth_axes(const LevelRow& row, const RowLimits* limits, LaneSpan span) {
   Float8 most{};
@@ -207,7 +207,7 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
     everywhere(allowed[static_cast<std::size_t>(n)]);
     narrow_beside<kUniform, kLimits>(allowed[static_cast<std::size_t>(n)], at, s, bounds, group);
   }
-  // Every second voxel at a time: next to fixed neighbours a limit is an interval.
+  // Every second voxel moves at a time. With its neighbours fixed, a voxel's limits are an interval.
 #pragma GCC unroll 1
   for (int colour = 0; colour < 2; ++colour) {
 #pragma GCC unroll 1
@@ -241,7 +241,8 @@ HYBRID_INLINE void correct_axis(const LevelRow& row, const AxisBounds& bounds, s
   }
 }
 
-// The part of a correction that stopped voxels refuse. Returns the bits of the axes that have any.
+// Sets `refused` to the part of a correction that stopped voxels refuse. Returns the bits of the axes that
+// have any.
 template <bool kUniform>
 HYBRID_INLINE unsigned note_stopped(const LevelRow& row, LaneSpan span, const RowVector& correction,
                                     RowVector& refused) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inner loops of relaxation on all three axes of one row, in vectors. Pure functions of memory; Multigrid
-// decides which rows, and what follows.
+// Inner loops of relaxation on all three axes of one row, in vectors. They only read and write the given
+// memory: Multigrid decides which rows they process, and what follows.
 //
 // They work on spans of Float8, so that a contact narrower than a row costs no more than its width.
 #pragma once
@@ -22,46 +22,47 @@ struct LevelRow {
   std::ptrdiff_t z = 0, x = 0;         // floats to the next row in z, and in x; kRow in y
   RowStiffness springs;
   const std::uint8_t* held = nullptr;  // [lane] bit 0: does not move; null: all may
-  const std::uint8_t* stopped =
-      nullptr;  // [lane] bit `axis`: an active limit holds it on that axis; null: none
-  // [axis] Boundary springs: stiffness over that of all links of the cell, times hold_times; and where they
-  // pull to. All null: there are none.
+  // [lane] bit `axis`: an active limit holds it on that axis; null: none
+  const std::uint8_t* stopped = nullptr;
+  // [axis] Boundary springs; all null if there are none. `hold`: their stiffness divided by that of all links
+  // of the cell, to be multiplied by hold_times. `held_at`: the place that they pull to.
   std::array<const float*, 3> hold{};
   std::array<const float*, 3> held_at{};
   float hold_times = 1.0F;
 };
 
-// Moves the voxels of a row, or its cells (`limits` null), to the minimum of their energy, the rows around
-// fixed, every second one first. Returns the largest motion (m).
+// Moves every second voxel or cell (`limits` null) of a row, then the others, each to the minimum of its
+// energy. The rows around stay fixed. Returns the largest motion (m).
 float smooth_row(const LevelRow& row, const RowLimits* limits, LaneSpan span) noexcept;
 
 using RowVector = std::array<Lanes, 3>;  // [axis][lane]
 
 struct RowResidual {
   float most_N = 0.0F, most_way_m = 0.0F;  // largest residual, and the largest motion that a lane would make
-  std::array<std::uint32_t, 3>
-      resisted{};  // [axis] lanes that pull against an active limit; their residual counts as 0
+  // [axis] lanes that pull against an active limit; their residual counts as 0
+  std::array<std::uint32_t, 3> resisted{};
 };
 
 // Residual of each lane that may move: force of links, load and boundary springs (N); 0 for others. A link
-// nearer to its limit than `tight_m` is at it.
+// nearer to its limit than `tight_m` counts as being at its limit.
 RowResidual residual_row(const LevelRow& row, const RowLimits* limits, float tight_m, LaneSpan span,
                          RowVector& out) noexcept;
-// Renews the maxima after `out` was changed.
+// Renews the maxima in `out` after `residual` was changed.
 void measure_row(const RowStiffness& springs, const RowVector& residual, LaneSpan span,
                  RowResidual& out) noexcept;
 
-// Adds pairs of lanes of a finer row, of one axis, to half of a coarse row, from its Float8 span.first/2 on.
+// Adds each pair of lanes of a finer row to the lane above it, on one axis. `half` is half of the coarse row;
+// its Float8 span.first/2 is the first to change.
 void add_pairs(const float* fine, LaneSpan span, float* half) noexcept;
 
-// From the sums over children: prolonged = their means; value keeps its pending correction.
+// Sets `prolonged` to the means of the children, whose sums are given. `value` keeps its pending correction.
 void take_means(const RowVector& sums, const float* share, const std::array<float*, 3>& value,
                 const std::array<float*, 3>& prolonged, LaneSpan span) noexcept;
 // FAS load: load = force − Σ k (prolonged(neighbour) − prolonged); row.u is `prolonged`.
 void take_loads(const LevelRow& row, const RowVector& force, const std::array<float*, 3>& load,
                 LaneSpan span) noexcept;
-// Of lanes first … last of a coarse row (which may extend beyond it): out = value − prolonged, then prolonged
-// = value. out is 0 in the span's other lanes.
+// In lanes first … last of a coarse row: out = filled · (value − prolonged), then prolonged = value. These
+// lanes may extend beyond the row. `out` is 0 in the span's other lanes.
 void take_pending_correction(const float* value, float* prolonged, const float* filled, LaneSpan span,
                              int first, int last, float* out) noexcept;
 // Interpolation along x from cells to lanes of the finer level: 3/4 of the own cell, 1/4 of the nearer
@@ -90,15 +91,16 @@ float row_difference(const float* a, const float* b, LaneSpan span, int first, i
 // way = now − was of one axis of a row; returns the largest |way|.
 float row_way(const float* now, const float* was, float* way) noexcept;
 
-// Links at their limits of a row of voxels on one axis, and their loads; bits are lanes.
+// Links of a row of voxels that are at their limits on one axis, and the voxels' loads. The bits of a mask
+// are lanes.
 struct LinksAtLimits {
-  // [d] links up and links down whose difference is at its lower, or upper, limit
+  // [d] links up, and links down, whose difference is at its lower limit, or at its upper limit
   std::array<std::uint32_t, 3> at_low, at_high, down_at_low, down_at_high;
   std::uint32_t pulled_up, pulled_down;
   std::uint32_t movable;  // not anchored
   Lanes pull_N;           // force of links and loads
 };
-// Only `axis` of `row` is read. A link nearer to its limit than tight_m[d] is at it.
+// Only `axis` of `row` is read. A link nearer to its limit than tight_m[d] counts as being at its limit.
 void links_at_limits(const LevelRow& row, const RowLimits& limits, std::size_t axis,
                      const std::array<float, 3>& tight_m, LinksAtLimits& out) noexcept;
 
@@ -117,13 +119,13 @@ enum Side : unsigned { kYDown = 1, kYUp = 2, kZDown = 4, kZUp = 8, kXDown = 16, 
 
 struct SetOut {
   float most_m = 0.0F;  // largest motion asked of a voxel
-  bool cut = false;     // a voxel that does not move was asked to
+  bool cut = false;     // a voxel that does not move was asked to move
   bool beyond = false;  // links in the row, or to one of its `sides`, may be beyond their limits
-  unsigned stopped =
-      0;  // bits of the axes on which an active limit (row.stopped) holds a voxel that was asked to move
+  // bits of the axes on which an active limit (row.stopped) holds a voxel that was asked to move
+  unsigned stopped = 0;
 };
 // Adds `way` to a row regardless of its links; held, anchored and stopped voxels stay. `way` then holds where
-// the row was. `refused`, if anything is stopped: the motion of stopped voxels in the lanes of the span.
+// the row was. If any voxel is stopped, `refused` is the motion of stopped voxels in the lanes of the span.
 SetOut set_out_row(const LevelRow& row, const RowLimits& limits, LaneSpan span, unsigned sides,
                    RowVector& way, RowVector& refused) noexcept;
 // May links in a row, or to one of its sides, be beyond their limits?

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Inside of the row passes: a Float8 of a row, its neighbours, and the springs between them.
+// Internal to the row passes: a Float8 of a row, its neighbours, and the springs between them.
 #pragma once
 
 #include <array>
@@ -101,7 +101,8 @@ template <bool kUniform>
 HYBRID_INLINE void inverse_of(Float8& inverse, const RowStiffness& s, std::size_t axis, int group) {
   load(inverse, s.inverse + axis * kRow + (kUniform ? 0 : group * kLanes));
 }
-// All axes side by side: one axis alone is a chain of dependent operations.
+// Displacements on all axes. They are processed side by side, because one axis alone is a chain of dependent
+// operations.
 using Axes = std::array<std::array<Float8, kLaneGroups + 2>, 3>;
 
 HYBRID_INLINE void load_axes(Axes& u, const LevelRow& row, LaneSpan span) {

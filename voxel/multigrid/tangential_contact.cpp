@@ -11,8 +11,8 @@
 namespace voxel {
 namespace {
 
-// Do its links allow a voxel to move by `way`, which is tangential? Clamped on one axis, it would leave the
-// tool or enter it; so it stays then.
+// True if its links allow a voxel to move by `way`, which is tangential. Otherwise the voxel has to stay: if
+// its motion were clamped on one axis, it would leave the tool or enter it.
 bool allowed(LevelStiffness& couplings, const Displacement& state, VoxelId v,
              const glm::dvec3& way) noexcept {
   const glm::dvec3 wanted = state.at(v) + way;

@@ -14,7 +14,7 @@
 
 namespace voxel {
 
-// For voxels with the role `pressed`; `load_N` is added to the force of their links.
+// The functions below are for voxels with the role `pressed`. `load_N` is added to the force of their links.
 
 // Tangential force on a voxel (N); nullopt if its links do not allow it to move that way.
 [[nodiscard]] std::optional<glm::dvec3> sliding_force(LevelStiffness& couplings, const Displacement& state,
@@ -22,7 +22,7 @@ namespace voxel {
 // Moves a voxel to its least energy in the tangent plane. Returns the largest component of the motion (m).
 float slide(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& load_N) noexcept;
 // Moves a voxel by the tangential part of `way`, or not at all if its links do not allow that. Returns the
-// same.
+// largest component of the motion (m).
 float slide_by(LevelStiffness& couplings, Displacement& state, VoxelId v, const glm::dvec3& way) noexcept;
 
 }  // namespace voxel

@@ -11,13 +11,13 @@ namespace voxel {
 namespace {
 
 constexpr std::uint32_t kRemembered = 8;
-// Of the spacing: how much deeper in its half-space a voxel may get.
+// Largest extra depth that a voxel may gain in its half-space (unit: spacing).
 constexpr double kDeeper = 1e-3;
 
 }  // namespace
 
-// Part of the motion to the iterate at whose end the energy is least, limited by how deep voxels get in their
-// half-spaces.
+// Fraction of the motion from `from` to `found` that minimises the energy, at most 1. It is limited by the
+// voxels' depth in their half-spaces.
 double AdmmRegion::share() const noexcept {
   double most = 1.0, slope = 0.0, curvature = 0.0;
   for (std::size_t i = 0; i < members_.size(); ++i) {
@@ -26,7 +26,7 @@ double AdmmRegion::share() const noexcept {
       slope -= m.load_N[axis] * (m.found[axis] - m.from[axis]);
     for (std::size_t d = 0; d < 3; ++d) {
       if (m.up[d] == kNone) continue;
-      const Link& l = links_[3 * i + d];  // without stiffness if neither end moves
+      const Link& l = links_[3 * i + d];  // its stiffness is 0 if neither end moves
       const Member& n = members_[m.up[d]];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const double is = n.from[axis] - m.from[axis], more = n.found[axis] - m.found[axis] - is;
@@ -46,7 +46,7 @@ double AdmmRegion::share() const noexcept {
 void AdmmRegion::forget(Multigrid& multigrid, VoxelId v) noexcept {
   multigrid.set_limit_load(v, glm::vec3(0.0F));
   const auto forget_of = [v](LazyArray<float>& of_axis) {
-    if (of_axis[v] != 0.0F) of_axis[v] = 0.0F;  // memory that was only read is not written
+    if (of_axis[v] != 0.0F) of_axis[v] = 0.0F;  // writing a zero would allocate an untouched page
   };
   for (auto& of_axis : beyond_) forget_of(of_axis);
   for (auto& of_axis : pressed_) forget_of(of_axis);
@@ -83,7 +83,7 @@ void AdmmRegion::keep_multipliers(Multigrid& multigrid) noexcept {
       if (known_.size() == known_.capacity()) continue;
       known_.push_back(m.v);
     }
-    asked_[m.v] = calls_ + 1;  // the number that skip() below will have
+    asked_[m.v] = calls_ + 1;  // skip() below will increment calls_ to this number
     glm::vec3 pull(0.0F);
     for_links(i, [&](const Link& l, const Member&, bool up) {
       for (std::size_t axis = 0; axis < 3 && m.moves; ++axis) {

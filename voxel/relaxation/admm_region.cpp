@@ -9,25 +9,28 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMost = 4096;  // voxels that move
+constexpr std::size_t kMost = 4096;  // largest number of moving voxels
 constexpr std::size_t kMostKnown = 8 * kMost;
-constexpr int kDeep = 3;                      // links from the sources of the region …
-constexpr int kFar = 12;                      // … and through links at their limits
-constexpr int kSweeps = 30, kTickSweeps = 6;  // in a round of relaxation beside bodies; in a tick
-constexpr int kToolSweeps = 100;              // in a round with the tool, which no tick waits for
+constexpr int kDeep = 3;  // layers of neighbours that all belong to the region
+constexpr int kFar = 12;  // all layers; those beyond kDeep follow only links at their limits
+constexpr int kSweeps = 30, kTickSweeps = 6;  // sweeps in a round beside moving bodies; in a tick
+constexpr int kToolSweeps = 100;              // sweeps in a round under the tool, which no tick waits for
 constexpr std::uint64_t kOtherWork = 5;
-constexpr double kFurther = 1.6;         // over-relaxation (Boyd et al., 3.4.3)
-constexpr double kActiveAtFirst = 1e-3;  // of the spacing: a link this near to its limit makes a region
-constexpr double kNearLimit = 0.4;       // of the spacing: nearer to its limit than this a link may reach it
-// Of the spacing: limits are tightened by this while the least energy is searched, so that the result
-// violates them by little …
+constexpr double kFurther = 1.6;  // over-relaxation (Boyd et al., 3.4.3)
+// Distances of a link from its limit (unit: spacing). Below the first it is at its limit; below the second it
+// may reach its limit.
+constexpr double kActiveAtFirst = 1e-3;
+constexpr double kNearLimit = 0.4;
+// Limits are tightened by this while the least energy is searched, so that the result hardly violates them
+// (unit: spacing).
 constexpr double kTighter = 2e-5;
-// … and by this under the tool, where cycles and the tick go on from the result up to the limits themselves.
+// The same under the tool, where cycles and the tick continue from the result up to the limits themselves.
 constexpr double kTighterAtTool = 2e-6;
-constexpr double kSqueezed = 5e-3;  // of the spacing: a voxel deeper in an obstacle cannot leave it
-constexpr int kRounds = 4;          // alternating between limits and obstacles
-constexpr int kMostPasses = 60;     // until one axis is within its limits
-constexpr double kRounding = 1e-9;  // of the spacing
+constexpr double kSqueezed = 5e-3;  // (unit: spacing) a voxel deeper in an obstacle than this is squeezed: it
+                                    // cannot leave the obstacle
+constexpr int kRounds = 4;          // rounds that alternate between limits and obstacles
+constexpr int kMostPasses = 60;     // most passes until one axis is within its limits
+constexpr double kRounding = 1e-9;  // (unit: spacing)
 
 }  // namespace
 
@@ -113,7 +116,7 @@ bool AdmmRegion::gather(const Multigrid& multigrid, const Displacement& state, b
   return true;
 }
 
-// Adds the neighbours of all moving members, as fixed members.
+// Adds the neighbours of all moving members as fixed members.
 void AdmmRegion::add_neighbours() noexcept {
   const std::size_t moving = members_.size();
   for (std::size_t i = 0; i < moving; ++i) {
@@ -161,7 +164,7 @@ void AdmmRegion::prepare_links(LevelStiffness& couplings) noexcept {
   }
 }
 
-// False if no link is at its limit, or a voxel is squeezed.
+// Prepares members and links. False if no link is at its limit, or if a voxel is squeezed.
 bool AdmmRegion::prepare(Multigrid& multigrid, const Displacement& state,
                          const ObstacleView& obstacles) noexcept {
   for (Member& m : members_) {
@@ -200,7 +203,7 @@ bool AdmmRegion::prepare(Multigrid& multigrid, const Displacement& state,
   return true;
 }
 
-// Gauss-Seidel on the augmented Lagrangian.
+// One Gauss-Seidel sweep on the augmented Lagrangian.
 void AdmmRegion::sweep(bool forwards) noexcept {
   const std::size_t count = members_.size();
   for (std::size_t n = 0; n < count; ++n) {
@@ -251,8 +254,9 @@ void AdmmRegion::set_multipliers() noexcept {
   }
 }
 
-// Brings one axis within its limits: downwards to the shortest path from any other member, or upwards.
-// Difference constraints are closed under minimum and maximum, so one after the other suffices.
+// Brings one axis within its limits: lowers each member (`downwards`) to the shortest path from any other
+// member, or raises it. Solutions of difference constraints are closed under minimum and maximum, so lowering
+// and then raising suffices. False if kMostPasses passes did not suffice.
 bool AdmmRegion::come_within(std::size_t axis, bool downwards) noexcept {
   const std::size_t count = members_.size();
   for (int n = 0; n < kMostPasses; ++n) {
@@ -278,7 +282,8 @@ bool AdmmRegion::come_within(std::size_t axis, bool downwards) noexcept {
   return false;
 }
 
-// Brings the result within limits, and out of obstacles as far as these allow.
+// Brings the result within its limits, and out of obstacles as far as the limits allow. False if limits
+// remain violated.
 bool AdmmRegion::allow() noexcept {
   for (int n = 0; n < kRounds; ++n) {
     bool deep = false;

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Least energy of tissue at its limits, beside a body or under the tool: limits and obstacles are solved
-// together on a small region.
+// Minimises the energy of tissue at its limits, beside a body or under the tool. Limits and obstacles are
+// solved together on a small region.
 //
-// Voxel by voxel, hardly anything can move there: limits block each voxel alone, and a voxel that slides
-// along a body takes its dependents in other directions. Coarse levels do not help.
+// If voxels moved one at a time, hardly any could move there: limits block each voxel alone, and a voxel that
+// slides along a body takes its dependents in other directions. Coarse levels do not help.
 //
-// The solver is the alternating direction method of multipliers (Boyd et al., Distributed Optimization and
-// Statistical Learning via ADMM, 2011, chapter 3), with a Gauss-Seidel sweep instead of the exact
+// The solver is the alternating direction method of multipliers (ADMM; Boyd et al., Distributed Optimization
+// and Statistical Learning via ADMM, 2011, chapter 3), with a Gauss-Seidel sweep instead of the exact
 // minimisation. Multipliers are kept from call to call. The result is clamped to the limits, and the tissue
-// moves there as far as its energy falls.
+// moves towards it as far as its energy falls.
 //
-// Under the tool, for objects that touch nothing else, pressed voxels slide on their tangent planes and their
-// dependents belong to the region.
+// Under the tool (for objects that touch nothing else), pressed voxels and their dependents belong to the
+// region. Pressed voxels slide on their tangent planes.
 //
-// Multipliers are the forces of links at their limits and of obstacles. The coarse levels get the first as
-// loads (Multigrid::set_limit_load), because otherwise they would pull at voxels that limits hold. A moving
-// body feels the second.
+// Multipliers are the forces of links at their limits and of obstacles. The coarse levels get the forces of
+// links as loads (Multigrid::set_limit_load): otherwise they would pull at voxels that limits hold. A moving
+// body feels the forces of obstacles.
 #pragma once
 
 #include <array>
@@ -34,16 +34,16 @@ namespace voxel {
 class AdmmRegion {
  public:
   explicit AdmmRegion(const Lattice& lattice);
-  // Takes all memory now, not when a body is first pressed …
+  // Allocates all memory now rather than when a body is first pressed.
   void prepare_all();
-  // … and without the arrays by voxel, most of which a tool never touches.
+  // The same without the arrays by voxel, most of which a tool never touches.
   void prepare_lists();
 
-  // Relaxes a region: voxels that active limits hold or that lie `on_body`, and their neighbourhood, further
-  // along links at their limits. Empty `on_body`: those of the last call that had any, and with more sweeps.
-  // If no link is at its limit, or a voxel is squeezed into an obstacle (no multiplier balances that), all
-  // multipliers are dropped. `briefly`: half the sweeps, for tissue that is still moving. Returns the largest
-  // force that moved a voxel (N).
+  // Relaxes a region: voxels that active limits hold or that are in `on_body`, and their neighbourhood, which
+  // extends further along links at their limits. If `on_body` is empty, the last non-empty one is used again,
+  // with more sweeps. All multipliers are dropped if no link is at its limit, or if a voxel is squeezed into
+  // an obstacle, which no multiplier balances. `briefly` halves the sweeps, for tissue that is still moving.
+  // Returns the largest force that moved a voxel (N).
   double relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                std::span<const VoxelId> on_body, bool briefly = false) noexcept;
   // Was any link of the region at its limit in the last relax()?
@@ -54,7 +54,8 @@ class AdmmRegion {
                  z = static_cast<double>(pressed_[2][v]);
     return std::sqrt(x * x + y * y + z * z);
   }
-  // Nothing to relax: drops multipliers that no call used for a while. forget() drops all of them.
+  // Call skip() if there is nothing to relax: it drops multipliers that no call has used for a while.
+  // forget() drops all of them.
   void skip(Multigrid& multigrid) noexcept;
   void forget(Multigrid& multigrid) noexcept;
   // Work of the last relax(), in voxel updates.
@@ -62,26 +63,25 @@ class AdmmRegion {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // Penalty of the augmented Lagrangian (in units of the link's own spring, or of the voxel's springs at its
-  // obstacle).
+  // Penalty of a link in the augmented Lagrangian (unit: the link's own spring).
   static constexpr double kOfLink = 1.0;
 
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   using Axes = std::array<double, 3>;
   struct Member {
     VoxelId v = 0;
-    bool moves = false;    // false: it borders the region and is fixed
-    bool outside = false;  // it has to stay outside of an obstacle, or of the tool
-    Obstacle plane;        // that half-space, for the displacement
+    bool moves = false;    // false: a fixed voxel that borders the region
+    bool outside = false;  // it has to stay outside of an obstacle or of the tool
+    Obstacle plane;        // the half-space of that obstacle, for the displacement
     std::array<std::uint32_t, 3> up{kNone, kNone, kNone},
         down{kNone, kNone, kNone};  // neighbours, as indices into members_
     Axes from{}, found{};           // displacement before, and of the current iterate (m)
-    Axes load_N{};                  // without its links
-    Axes inverse{};                 // 1 / (its springs with their penalties), per axis (m/N)
+    Axes load_N{};                  // load without the forces of its links
+    Axes inverse{};                 // 1 / (springs of its links and all penalties), per axis (m/N)
     double hold_N_per_m = 0;        // penalty of its obstacle
     Axes out{}, pressed{};  // copy of the displacement outside of the obstacle (m), and scaled multiplier (m)
   };
-  struct Link {  // from a member to the one above it, per axis
+  struct Link {  // from a member to its neighbour above; values per axis
     Axes stiff_N_per_m{}, low{}, high{};
     Axes within{}, beyond{};  // copy of the difference within the limits (m), and scaled multiplier (m)
     std::uint8_t near = 0;    // bits: axes on which it may reach a limit
@@ -107,22 +107,22 @@ class AdmmRegion {
   const Lattice& lattice_;
   double spacing_m_;
   double tighter_m_ = 0.0;
-  LazyVector<VoxelId> on_body_;  // of the last call that had any
+  LazyVector<VoxelId> on_body_;  // the last `on_body` that was not empty
   LazyVector<Member> members_;
   LazyVector<Link> links_;           // [3 member + d]
   LazyArray<std::uint32_t> number_;  // [v] 1 + index into members_; 0: none
   // Kept from call to call.
   LazyVector<VoxelId> known_;
-  LazyArray<std::uint32_t> asked_;  // [v] number of the last call that used it; 0: not known
-  std::array<LazyArray<float>, 9>
-      beyond_;  // [3 axis + d][v] scaled multiplier of the link to the voxel above (m)
+  LazyArray<std::uint32_t> asked_;  // [v] number of the last call that used its multipliers; 0: none is kept
+  // [3 axis + d][v] scaled multiplier of the link to the voxel above (m)
+  std::array<LazyArray<float>, 9> beyond_;
   std::array<LazyArray<float>, 3> pressed_;  // [axis][v] force of the obstacle (N)
   std::uint32_t calls_ = 0;
   std::uint64_t looked_at_ = 0;
   bool at_limits_ = false;
 };
 
-// `visit(link, neighbour, up)` for the links of a member; `up`: the neighbour is the upper end.
+// Calls visit(link, neighbour, up) for the links of a member. `up`: the neighbour is the upper end.
 template <class Visit>
 void AdmmRegion::for_links(std::size_t i, const Visit& visit) const noexcept {
   const Member& m = members_[i];

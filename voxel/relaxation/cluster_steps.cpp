@@ -11,10 +11,10 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMostVoxels = 20'000;      // voxels of a cluster
-constexpr std::uint64_t kMostLookedAt = 40'000;  // voxels visited since begin()
+constexpr std::size_t kMostVoxels = 20'000;      // largest number of voxels in a cluster
+constexpr std::uint64_t kMostLookedAt = 40'000;  // largest number of voxels visited since begin()
 constexpr std::uint8_t kIn = 1;
-// Of the spacing: a link nearer to its limit than this blocks motion.
+// A link nearer to its limit than this blocks motion (unit: spacing).
 constexpr float kExactlyAtLimit = 1e-6F;
 
 // How far u(from) may move before the link to its neighbour stops it.
@@ -22,7 +22,7 @@ float room(const Lattice& lattice, const LazyArray<float>& u, VoxelId from, int 
            bool upwards) noexcept {
   const VoxelId to = up ? lattice.up(from, d) : lattice.down(from, d);
   auto b = lattice.bounds(up ? from : to, d, axis);
-  if (!up) b = {-b[1], -b[0]};  // of u(to) − u(from), whichever way the link points
+  if (!up) b = {-b[1], -b[0]};  // limits of u(to) − u(from), whichever way the link points
   const float difference = u[to] - u[from];
   return upwards ? difference - b[0] : b[1] - difference;
 }

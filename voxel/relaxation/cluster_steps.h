@@ -24,11 +24,11 @@ class ClusterSteps {
  public:
   explicit ClusterSteps(const Lattice& lattice);
 
-  // Moves the cluster of a voxel on one axis. Rigid blocks are parts of clusters as wholes. Nothing moves if
-  // a voxel of the cluster is held, anchored or at an obstacle, or in a block that the tool presses; if the
-  // cluster's net force points the other way or is at most `least_N` a voxel; if the voxel was in another
-  // cluster on this axis since begin(); or if too many voxels were visited since begin(). Returns the force
-  // per voxel that moved the cluster (N); 0: nothing moved.
+  // Moves the cluster of a voxel on one axis. A rigid block belongs to a cluster as a whole. Nothing moves in
+  // these cases: a voxel of the cluster is held, anchored, at an obstacle or in a block that the tool
+  // presses; the cluster's net force points against that of the voxel or is at most `least_N` per voxel; the
+  // voxel was in another cluster on this axis since begin(); too many voxels were visited since begin(), or
+  // are in the cluster. Returns the force per voxel that moved the cluster (N), or 0 if nothing moved.
   double move(Multigrid& multigrid, Displacement& state, VoxelId v, int axis, double least_N) noexcept;
   // Voxels of the last cluster.
   [[nodiscard]] const std::vector<VoxelId>& moved() const { return cluster_; }
@@ -44,7 +44,8 @@ class ClusterSteps {
 
   const Lattice& lattice_;
   std::vector<VoxelId> cluster_, seen_;
-  LazyArray<std::uint8_t> mark_;  // [v] 1: in the cluster; 2, 4, 8: was in one on that axis since begin()
+  // [v] Bit 0: it is in the current cluster. Bits 1 to 3: it was in one on axis x, y, z since begin().
+  LazyArray<std::uint8_t> mark_;
   std::uint64_t looked_at_ = 0;
 };
 

@@ -22,8 +22,8 @@ std::uint32_t staying(const Lattice& lattice, const Displacement& state, RowId r
   return bits;
 }
 
-// Limits b0 <= u(upper) − u(lower) <= b1 on axis kAxis of a voxel's link to its neighbour above (kUp) or
-// below in kD.
+// Limits b0 <= u(upper) − u(lower) <= b1 on axis kAxis of the link between a voxel and its neighbour above
+// (kUp) or below along kD.
 template <std::size_t kAxis, std::size_t kD, bool kUp>
 std::array<float, 2> bounds_of(const RowLimits& limits, std::size_t lane) {
   if (limits.lanes == nullptr) {
@@ -39,7 +39,7 @@ std::array<float, 2> bounds_of(const RowLimits& limits, std::size_t lane) {
   }
 }
 
-// Adds the springs of a voxel's links in kD to its load, and their limits to its interval.
+// Adds the forces of a voxel's links along kD to its load, and narrows its interval by their limits.
 template <std::size_t kAxis, std::size_t kD>
 void add_links(const RowStiffness& springs, const RowLimits& limits, std::size_t lane, float up, float down,
                float& pull, std::array<float, 2>& interval) {
@@ -49,7 +49,7 @@ void add_links(const RowStiffness& springs, const RowLimits& limits, std::size_t
   pull += k_up * up + k_down * down;
   const std::array<float, 2> above = bounds_of<kAxis, kD, true>(limits, lane),
                              below = bounds_of<kAxis, kD, false>(limits, lane);
-  // A row with one set of limits has them for missing links, too.
+  // If a row has one set of limits for all lanes, missing links have limits, too. They have no spring.
   if (k_up > 0.0F) {
     interval[0] = std::max(interval[0], up - above[1]);
     interval[1] = std::min(interval[1], up - above[0]);
@@ -70,7 +70,7 @@ LimitFollowers::LimitFollowers(const Lattice& lattice, std::size_t most_sources)
   followers_.reserve(most_sources + kMaxFollowers + 6);
 }
 
-// Null: the row is empty, or too many were searched.
+// Null if the row is empty, or if too many rows were searched.
 LimitFollowers::Row* LimitFollowers::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
   LevelStiffness& couplings = relaxation_->couplings();
@@ -120,7 +120,7 @@ void LimitFollowers::move_on(std::span<const VoxelId> sources) noexcept {
   }
 }
 
-// Visits a voxel from its neighbour below in kD (kUp), or above.
+// Visits voxel `at` from its neighbour `from` along kD, which is below it (kUp) or above it.
 template <std::size_t kAxis, std::size_t kD, bool kUp>
 void LimitFollowers::visit(VoxelId from, VoxelId at) noexcept {
   Row* row = look_at(at / kRow);
@@ -144,7 +144,7 @@ void LimitFollowers::visit(VoxelId from, VoxelId at) noexcept {
   if (room(place) <= kAtLimit * spacing_m_[kD]) add(*row, at);
 }
 
-// Local equilibrium of a voxel, all others fixed.
+// Displacement of a voxel at its local equilibrium, with all others fixed.
 template <std::size_t kAxis>
 float LimitFollowers::local_equilibrium(const Row& row, VoxelId v) const noexcept {
   const std::size_t lane = v % kRow;

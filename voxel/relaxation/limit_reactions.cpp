@@ -12,7 +12,7 @@
 namespace voxel {
 namespace {
 
-// Of the spacing: a voxel whose links are all further from their limits has no dependents.
+// A voxel whose links are all further from their limits than this has no dependents (unit: spacing).
 constexpr float kSurelyFree = 2e-4F;
 
 // Sum over the lanes whose bits are set.
@@ -28,16 +28,16 @@ struct LimitReactions::Gathering {
   LevelStiffness& couplings;
   std::span<const VoxelId> sources;  // sorted
   const Multigrid* multigrid;        // null: there are no rigid blocks
-  std::uint16_t source_block;        // the block whose voxels are the sources, by number; 0: none
+  std::uint16_t source_block;        // 1 + index of the block whose voxels are the sources; 0: none
   bool border_known = false;         // all of that block's border was visited
   std::bitset<Lattice::kMaxBlocks> known;
-  std::array<double, Lattice::kMaxBlocks> pull_N;  // [block] if known
+  std::array<double, Lattice::kMaxBlocks> pull_N;  // [block] valid if known[block]
 
-  // Voxels of a block have the block's load. Their own loads point either way, and would end the search at an
-  // inclusion.
+  // Voxels of a rigid block get the sign of the block's load. Their own loads have either sign, and would end
+  // the search at an inclusion.
   void pull_as_blocks(const Displacement& state, int axis, Row& row) {
     std::uint32_t of_blocks = 0, up = 0, down = 0;
-    std::uint16_t last = 0;  // most rows have one
+    std::uint16_t last = 0;  // most rows hold one block only
     double pull = 0.0;
     for (VoxelId lane = 0; lane < kRow; ++lane) {
       const std::uint16_t number = multigrid->blocks().of(0, row.row * kRow + lane);
@@ -79,11 +79,11 @@ LimitReactions::LimitReactions(const Lattice& lattice) : lattice_(lattice), entr
   queue_.resize(kMostRows);
 }
 
-// Null: the row is empty, or too many were searched.
+// Null if the row is empty, or if too many rows were searched.
 LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   if (entry_[row] != 0) return &rows_[entry_[row] - 1U];
   if (rows_.size() == kMostRows || !gathering_->couplings.prepare(row)) return nullptr;
-  // the inside of a block whose border was visited
+  // the row is inside of a block whose border was visited
   if (gathering_->border_known && gathering_->within_source_block(lattice_, row)) return nullptr;
   const Grid& g = lattice_.grid();
   const auto ua = static_cast<std::size_t>(axis_);
@@ -109,15 +109,15 @@ LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   return &out;
 }
 
-// Voxels of a row that links at their limits push against their loads; they are the upper or lower ends of
-// these links.
+// Lanes of a row that links at their limits push against their loads, or block both ways. `end` tells which
+// end of these links lies in the row.
 std::uint32_t LimitReactions::pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                      End end) noexcept {
   const std::uint32_t up = end == End::upper ? at_low : at_high, down = end == End::upper ? at_high : at_low;
   return (up & row.links.pulled_down) | (down & row.links.pulled_up) | (up & down);
 }
 
-// Adds voxels, and their dependents in the row itself.
+// Adds voxels of a row, and their dependents in the same row.
 void LimitReactions::add(Row& row, std::uint32_t bits) noexcept {
   const std::uint32_t before = row.gathered, low = row.links.at_low[0], high = row.links.at_high[0];
   row.gathered |= bits;
@@ -131,7 +131,8 @@ void LimitReactions::add(Row& row, std::uint32_t bits) noexcept {
   queue_[(head_ + waiting_++) % kMostRows] = static_cast<std::uint32_t>(&row - rows_.data());
 }
 
-// Adds the dependents in a row of voxels beside it; `end`: the end of the links that the row has.
+// Adds the voxels of `row` that depend on voxels of the row beside it. `at_low` and `at_high`: links between
+// the two rows that are at a limit. `end`: the end of these links that lies in `row`.
 void LimitReactions::ask(RowId row, std::uint32_t at_low, std::uint32_t at_high, End end) noexcept {
   if ((at_low | at_high) == 0) return;
   Row* to = look_at(row);
@@ -157,7 +158,8 @@ void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std:
     if (may_be_at_limit(lattice_, state, v, axis, kSurelyFree)) look_at(v / kRow);
   }
   find_all();
-  // Sources beside dependents of others, so that links between both are known as such.
+  // A source may lie beside a dependent of another source. Its row is looked at, too, so that dependents()
+  // does not take the link between both for a link to others.
   for (const VoxelId v : sources) {
     if (rows_.empty()) break;
     if (find(v / kRow) != nullptr) continue;

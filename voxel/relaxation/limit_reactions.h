@@ -2,8 +2,8 @@
 // Dependents of given voxels through links at their limits, and the loads and springs of all of them
 // together.
 //
-// Found a row of 32 voxels at a time, as bits: a tool that pushed a chain to its limits has some ten thousand
-// dependents.
+// The search handles a row of 32 voxels at a time, as bits, because a tool that has pushed a chain to its
+// limits has some ten thousand dependents.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ class Multigrid;
 
 class LimitReactions {
  public:
-  // Rows that are searched; voxels in further rows count as independent.
+  // Largest number of rows that are searched. Voxels in further rows count as independent.
   static constexpr std::size_t kMostRows = 4096;
 
   // Allocates; throws std::bad_alloc.
@@ -44,7 +44,7 @@ class LimitReactions {
   [[nodiscard]] bool gathered(VoxelId v) const noexcept {
     return (gathered_in(v / kRow) >> v % kRow & 1U) != 0;
   }
-  // Of a source: is any of its links to a voxel that may move at a limit?
+  // True if a link from this source to a voxel that is not anchored is at a limit.
   [[nodiscard]] bool at_limit(VoxelId source) const noexcept;
   // Sum of the dependents' loads, sources excluded (N), and of the springs between dependents and others
   // (N/m).
@@ -59,21 +59,21 @@ class LimitReactions {
 
  private:
   struct Gathering;
-  // Bits are lanes.
+  // A row that was searched. The bits of a mask are lanes.
   struct Row {
     RowId row;
     LinksAtLimits links;
     std::uint32_t sources = 0, gathered = 0;
-    std::uint32_t fresh = 0;  // of these: their neighbours are still to be visited
+    std::uint32_t fresh = 0;  // gathered voxels whose neighbours are still to be visited
     bool queued = false;
   };
-  enum class End : std::uint8_t { upper, lower };  // of a link
+  enum class End : std::uint8_t { upper, lower };  // end of a link
 
   [[nodiscard]] const Row* find(RowId row) const noexcept {
     return entry_[row] == 0 ? nullptr : &rows_[entry_[row] - 1U];
   }
   void begin(Gathering& gathering, Displacement& state, int axis) noexcept;
-  void find_all() noexcept;  // from the rows with sources on
+  void find_all() noexcept;  // starts at the rows with sources
   Row* look_at(RowId row) noexcept;
   [[nodiscard]] static std::uint32_t pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                             End end) noexcept;
@@ -85,8 +85,8 @@ class LimitReactions {
   }
 
   const Lattice& lattice_;
-  Gathering* gathering_ = nullptr;  // during gather()
-  Displacement* state_ = nullptr;   // the same; only read
+  Gathering* gathering_ = nullptr;  // set during gather()
+  Displacement* state_ = nullptr;   // set during gather(); only read
   int axis_ = 0;
   LazyArray<std::uint16_t> entry_;  // [row] 1 + index into rows_; 0: not looked at
   LazyVector<Row> rows_;

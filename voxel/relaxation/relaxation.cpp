@@ -10,21 +10,24 @@
 namespace voxel {
 namespace {
 
-// A residual is measured before coarse levels correct it. Around tissue a hundred times stiffer more than
-// that can be left afterwards.
+// Share of kRestingResidual at which relaxation stops. A residual is measured before coarse levels correct
+// it. Around tissue a hundred times stiffer, more can be left afterwards.
 constexpr double kMeasured = 0.5;
-// Spacings: a larger pending correction is dropped. Cells between obstacles could run away otherwise.
+// A pending correction larger than this is dropped (unit: spacing). Otherwise cells between obstacles could
+// diverge.
 constexpr float kFarthest = 2.0F;
-constexpr std::uint64_t kPatient = 200'000;  // voxel updates a call: more than a tick has
-// Cells around a contact that are smoothed on each level, for a contact cycle and for a large patch …
+constexpr std::uint64_t kPatient = 200'000;  // voxel updates per call; a tick has a smaller budget
+// Margin of cells around a contact that are smoothed on each level: in a contact cycle; in a cycle on a large
+// patch.
 constexpr int kContactMargin = 3, kLargePatchMargin = 14;
-// … and that get corrections after a jump.
+// Margin of cells around a contact that get corrections after a jump.
 constexpr int kProlongedMargin = 24;
-constexpr int kNear = 2;                     // rows that a contact cycle reads beyond those it relaxes
-constexpr std::uint64_t kBesideContact = 2;  // part of the budget that is left beside contact cycles
-// Cost of renewing bricks in a row (voxel updates), and the part of a budget for that.
+constexpr int kNear = 2;                     // rows that a contact cycle reads around those it relaxes
+constexpr std::uint64_t kBesideContact = 2;  // the budget is divided by this if a contact cycle ran
+// Cost of renewing the bricks of a row (unit: voxel update). The budget divided by kBrickShare is spent on
+// bricks.
 constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 2;
-constexpr int kLooksAtOnce = 256;  // tiles searched for pending corrections above them, per call
+constexpr int kLooksAtOnce = 256;  // tiles searched in one go for pending corrections above them
 
 }  // namespace
 
@@ -63,7 +66,7 @@ void Relaxation::prepare_beside_bodies() {
 
 void Relaxation::set_tolerance(double tolerance_N) noexcept {
   tolerance_N_ = tolerance_N;
-  // A motion below this changes no force by more than the tolerance.
+  // The motion tolerance: a smaller motion changes no force by more than `tolerance_N`.
   const double scale = lattice_.force_scale_N();
   multigrid_.set_motion_tolerance(
       static_cast<float>(tolerance_N),
@@ -115,8 +118,8 @@ void Relaxation::fix_held_voxels(const Displacement& state, std::span<const Voxe
     if (state.role[v] == Displacement::held && standing_.size() < standing_.capacity())
       standing_.push_back(v);
   }
-  // Loads of bricks lag by a cycle. With ν near 0.5 this error exceeds what the springs know, and the region
-  // would oscillate.
+  // Brick loads lag by a cycle. With ν near 0.5 this error exceeds the part of the force that springs model,
+  // and the region would oscillate.
   tool_presses_ = tool_presses_ && !others_hold && !lattice_.has_bricks();
   multigrid_.set_held(standing_);
   multigrid_.set_block_contacts(state, held);
@@ -148,7 +151,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
       if (round_left_ > 0 && --round_left_ == 0) end_round(state, obstacles, running_residual_N_);
       continue;
     }
-    // No tile is dirty: search for pending corrections above tiles.
+    // No tile is dirty. Tiles are searched for pending corrections of the cells above them.
     for (int n = 0; n < kLooksAtOnce && looked_at_ < tiles.tiles() && tiles.waiting() == 0;
          ++n, ++looked_at_) {
       if (tile_waits_for_coarse(cursor_)) tiles.push(cursor_);
@@ -208,7 +211,7 @@ std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView
   return run_steps(state, obstacles, at_once);
 }
 
-// Does an equal part of the steps that are left.
+// Does one of several equal parts of the steps that are left.
 std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obstacles,
                                   std::size_t at_once) noexcept {
   std::size_t left = work_of_planes(step_, plane_), done = 0;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Relaxation of the six-link energy towards equilibrium, under chain limits, anchors and obstacles.
 //
-// Per axis the energy is ½ Σ k (u(b) − u(a))² over the links: an anisotropic Laplace problem, solved by
-// multigrid cycles (fas.h). A cycle works on a box of voxels and, on each coarser level, on a box of cells
-// around it. So its cost hardly depends on the size of the object, and a cycle is complete in itself: cycles
-// in different places, one after the other, never find each other's corrections half prolonged.
+// Per axis the energy is ½ Σ k (u(b) − u(a))² over the links. This is an anisotropic Laplace problem, solved
+// by multigrid cycles (fas.h). A cycle works on a box of voxels and, on each coarser level, on a box of cells
+// around it. So its cost hardly depends on the size of the object. A cycle is complete in itself: a cycle
+// elsewhere never meets its corrections half prolonged.
 //
-// Around the contact there is a cycle in every tick; under asynchronous relaxation a cycle around a large
+// Around the contact there is a cycle in every tick. Under asynchronous relaxation a cycle around a large
 // patch may be split over ticks, and no other cycle runs between its parts. Elsewhere dirty tiles are relaxed
-// one after the other, within a budget of voxel updates: counted work, never measured time.
+// one after the other, within a budget of voxel updates. The budget counts work, never time.
 #pragma once
 
 #include <algorithm>
@@ -36,53 +36,59 @@ class Relaxation {
   explicit Relaxation(const Lattice& lattice);
   ~Relaxation();
 
-  // Spends `budget` voxel updates, on average over many calls (a cycle is not cut), or less if the object is
-  // at rest; half of it if a contact cycle ran since the last call. Returns the updates spent.
+  // Spends `budget` voxel updates on average over many calls, because a cycle is not cut. Spends half of it
+  // if a contact cycle ran since the last call, and less if the object is at rest. Returns the updates spent.
   std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                     std::uint64_t budget) noexcept;
   // One cycle over the whole object. For references, not for the tick.
   void run_cycle(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held) noexcept;
-  // One cycle around the contact: around the box of `pressed`, which is not empty and a part of `held`. Of a
-  // contact wider than kMaxNear voxels only the middle; whole cycles relax the rest. `again`: another contact
-  // cycle ended just before; under asynchronous relaxation this one then skips smoothing on the way to the
-  // coarse levels, which is cheaper and moves far tissue more. Returns its counted work: the number of Float8
-  // prolonged that would cost as much (about 45 ns each). Of a cycle around a large patch that costs more
-  // than `at_once` only a part is done; continue_contact() does the rest.
+  // One cycle around the contact, which is the box of `pressed`. `pressed` is not empty and a part of `held`.
+  // If the contact is wider than kMaxNear voxels, the cycle covers its middle only; whole cycles relax the
+  // rest. `again`: another contact cycle has just ended. Under asynchronous relaxation this cycle then skips
+  // smoothing on the way to the coarse levels, which is cheaper and moves far tissue more. Returns the
+  // counted work: the number of Float8 whose prolongation would cost as much (about 45 ns each). If a cycle
+  // around a large patch costs more than `at_once`, only a part of it is done, and continue_contact() does
+  // the rest.
   static constexpr int kMaxNear = 64;
   static constexpr std::size_t kUnlimited = ~std::size_t{0};
   std::size_t relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                             std::span<const VoxelId> pressed, bool again = false,
                             std::size_t at_once = kUnlimited) noexcept;
-  // Continues that cycle in the same boxes by about `at_once` of counted work, one step at least. Parts are
-  // as equal as steps allow. Between parts anything may be moved.
+  // Continues that cycle in the same boxes with about `at_once` of counted work. Parts are as equal as the
+  // steps allow. Voxels may be moved between parts.
   std::size_t continue_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, std::size_t at_once) noexcept;
   [[nodiscard]] bool under_way() const { return step_ > 0 || plane_ > 0; }
-  // Has the last or current contact cycle a large patch: more than kSmallPatch Float8 on all levels?
+  // A contact cycle has a large patch if it visits more than kSmallPatch Float8 on all levels together.
+  // has_large_patch() tells that of the last or current one.
   static constexpr std::size_t kSmallPatch = 2500;
-  // Scales kSmallPatch: if a tick has less work, more cycles are split.
+  // Factor on kSmallPatch (0 to 1). A smaller one splits more cycles, for ticks that may do less work.
   void set_small_patch_share(double share) noexcept { small_patch_share_ = share; }
   [[nodiscard]] bool has_large_patch() const { return large_patch_; }
   // Ends a cycle that is under way; pending corrections wait for the next one.
   void end_contact() noexcept { step_ = plane_ = 0; }
 
-  // A cycle on boxes large enough for tissue that has to move by spacings; for a thread with time for it.
-  // Active limits are released first, because during such motion other limits are active in each cycle.
-  // `coarse_first`, after a jump: coarse levels are relaxed to rest among themselves, and their correction is
-  // then prolonged to all voxels of the boxes at once. Returns Float8 visited.
+  // A cycle on boxes that are large enough for tissue that has to move by whole spacings. Only for a thread
+  // that has time for it. Active limits are released first, because during such motion other limits are
+  // active in each cycle. `coarse_first`, after a jump: coarse levels are relaxed to rest among themselves,
+  // and their correction is then prolonged to all voxels of the boxes at once. Returns the number of Float8
+  // visited.
   std::size_t relax_large_patch(Displacement& state, const ObstacleView& obstacles,
                                 std::span<const VoxelId> held, std::span<const VoxelId> pressed,
                                 bool coarse_first) noexcept;
-  // Prolongs pending corrections around such boxes, and no more. Returns Float8 prolonged.
+  // Prolongs pending corrections in those boxes and around them, and does nothing else. Returns the number of
+  // Float8 prolonged.
   std::size_t prolong_large_patch(Displacement& state, const ObstacleView& obstacles,
                                   std::span<const VoxelId> pressed) noexcept;
   // A cycle over the whole object, coarse levels first. Voxels get the correction last and are not smoothed:
-  // call relax_around_blocks() after it. Returns Float8 visited.
+  // call relax_around_blocks() after it. Returns the number of Float8 visited.
   std::size_t run_whole_coarse_first(Displacement& state, const ObstacleView& obstacles,
                                      std::span<const VoxelId> held) noexcept;
-  // Relaxes what limits hold under the tool (AdmmRegion), after cycles that do not end a round.
+  // Relaxes voxels that limits hold under the tool (AdmmRegion). Call it after cycles that do not end a
+  // round.
   void relax_region(Displacement& state, const ObstacleView& obstacles) noexcept;
-  // A cycle around each rigid block that the tool presses: the force depends on the springs all around it.
+  // Runs a cycle around each rigid block that the tool presses, because the force depends on the springs all
+  // around the block.
   void relax_around_blocks(Displacement& state, const ObstacleView& obstacles) noexcept;
 
   [[nodiscard]] LevelStiffness& couplings() { return multigrid_.couplings(); }
@@ -94,13 +100,13 @@ class Relaxation {
   void mark_dirty(RowId row) noexcept { multigrid_.mark_dirty(0, row); }
   void mark_all_dirty() noexcept;
   // If links around voxels on a body are at their limits, relaxes these voxels and their neighbourhood
-  // together (AdmmRegion). False: no link is.
+  // together (AdmmRegion). Returns false if no link is at its limit.
   bool relax_region(Displacement& state, const ObstacleView& obstacles,
                     std::span<const VoxelId> on_body) noexcept;
   [[nodiscard]] const AdmmRegion& region() const { return *region_; }
-  // Did active limits hold what the tool or a body presses, in the last such call?
+  // True if a link was at its limit in the last region that was relaxed under the tool or beside a body.
   [[nodiscard]] bool at_limits() const noexcept;
-  // Something moved: relaxes until the residual is below the tolerance again.
+  // Call when something moved: relaxation goes on until the residual is below the tolerance again.
   void wake() noexcept {
     asleep_ = false;
     cycles_without_gain_ = 0;
@@ -111,19 +117,20 @@ class Relaxation {
   // follows the tool. Allocates.
   void leave_to_shadow();
   [[nodiscard]] bool left_to_shadow() const { return left_to_shadow_; }
-  // Is a submission with the shadow now?
+  // True while a submitted state is with the shadow.
   [[nodiscard]] bool shadow_busy() const { return shadow_busy_; }
-  // The state was submitted: nothing to do here until something moves. The residual near the contact is
-  // frozen, because the shadow owns it.
+  // Call when the state was submitted to the shadow. Nothing is relaxed here until something moves. The
+  // residual near the contact is frozen, because the shadow owns it.
   void assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
-  // Work of assign_residual() and resume() that can be done ahead. Pending corrections are lost.
+  // drop_coarse() does work of assign_residual() and resume() ahead of time, on rows_to_drop() rows. Pending
+  // corrections are lost.
   [[nodiscard]] std::size_t rows_to_drop() const noexcept { return multigrid_.rows_to_drop(); }
   void drop_coarse() noexcept {
     end_contact();
     multigrid_.drop_coarse();
   }
-  // The shadow's result is applied from here on; `residual_N` is its residual.
+  // Call just before the last part of the shadow's result is applied. `residual_N` is the result's residual.
   void resume(double residual_N) noexcept {
     shadow_busy_ = false;
     end_contact();
@@ -142,21 +149,22 @@ class Relaxation {
     }
   };
   [[nodiscard]] const NearRows& near_contact() const { return near_; }
-  // Largest force on any free voxel (N), as the last round found it. If it is below the tolerance, only that
-  // is certain.
+  // Largest force on any free voxel (N), as the last round found it. Below the tolerance its exact value is
+  // unknown.
   [[nodiscard]] double residual_N() const { return residual_N_; }
   // Relaxation stops when the residual falls below this (N), or has not fallen for a while: under active
   // limits a residual remains that no relaxation removes. Default: half of kRestingResidual of the lattice's
   // force scale.
   void set_tolerance(double tolerance_N) noexcept;
-  // Rounds over all that moves.
+  // Number of rounds so far. A round covers everything that moves.
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   void prepare_all() noexcept { multigrid_.prepare_all(); }
   void prepare_beside_bodies();  // call if obstacles will move
-  void prepare_under_tool();     // for whole rounds, which a shadow runs
-  // Starts in the state of `other`, which has the same lattice …
+  void prepare_under_tool();     // call for a shadow, whose rounds relax under the tool
+  // Copies the state of `other`, which has the same lattice.
   void copy_from(const Relaxation& other) noexcept;
-  // … and restricts coarse cells anew, because `other` was left to a shadow and has hardly any.
+  // Restricts all coarse cells anew, after copy_from(): `other` was left to a shadow and has hardly any
+  // coarse cells.
   void renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -169,8 +177,8 @@ class Relaxation {
   struct LevelBoxes {
     RowBox smoothed;                         // relaxed
     RowBox parents;                          // cells above the relaxed box of the finer level
-    RowBox source_cells;                     // these and the cells beside them, which prolong
-    int first_source = 0, last_source = -1;  // the same as cells along x
+    RowBox source_cells;                     // the parents and the cells beside them, which prolong
+    int first_source = 0, last_source = -1;  // range of the source cells along x
     RowBox prolonged;                        // receives the corrections of the coarser level's source cells
   };
   enum class Look : std::uint8_t { all_rows, active_rows };  // active: rows at rest are skipped
@@ -204,8 +212,8 @@ class Relaxation {
   [[nodiscard]] const std::vector<Step>& steps_now() const noexcept {
     return steps_[static_cast<std::size_t>(visits_)];
   }
-  // Steps of all but the coarsest level may be split into planes along z, first … last of the box, starting
-  // with 0.
+  // Planes first … last along z of a step's box; plane 0 is the first of the box. Steps on all levels but the
+  // coarsest may be split into planes.
   struct Planes {
     int first = 0, last = 0;
   };
@@ -219,7 +227,8 @@ class Relaxation {
             bool smoothed) noexcept;
   std::size_t run_steps(Displacement& state, const ObstacleView& obstacles, std::size_t at_once) noexcept;
   [[nodiscard]] std::size_t work_of_step(int n) const noexcept;
-  [[nodiscard]] std::size_t work_of_planes(int n, int first) const noexcept;  // of it, from that plane on
+  // Work of step n from plane `first` on.
+  [[nodiscard]] std::size_t work_of_planes(int n, int first) const noexcept;
   void restrict_residual(int level, Displacement& state, const ObstacleView& obstacles, Look look,
                          Planes planes) noexcept;
   void fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept;
@@ -237,7 +246,7 @@ class Relaxation {
   template <class Visit>
   void for_rows(int level, const RowBox& box, const Visit& visit) noexcept;
   [[nodiscard]] RowBox clipped(int level, const RowBox& box) const noexcept;
-  [[nodiscard]] int last_level() const noexcept;  // of a cycle
+  [[nodiscard]] int last_level() const noexcept;  // coarsest level of a cycle
   [[nodiscard]] static std::size_t groups(const RowBox& box);
   [[nodiscard]] static RigidBlocks::Box cells(const RowBox& b) {
     return {{b.q0 * kLanes, b.j0, b.k0}, {b.q1 * kLanes + kLanes - 1, b.j1, b.k1}};
@@ -251,14 +260,15 @@ class Relaxation {
   std::unique_ptr<AdmmRegion> region_;
   std::vector<LevelBoxes> boxes_;
   std::array<std::vector<Step>, 2> steps_;  // [Visits]
-  Visits visits_ = Visits::once;            // of the cycle whose boxes are laid
+  Visits visits_ = Visits::once;            // visits of the cycle whose boxes are laid
   LazyVector<VoxelId> standing_;            // voxels held on all axes in the last cycle
   bool tool_presses_ = false;               // the tool presses voxels
-  bool patient_ = false;                    // rounds do not run in a tick
+  bool patient_ = false;                    // rounds may take longer than a tick
   std::int64_t credit_ = 0;                 // voxel updates left; negative: overspent
   std::size_t round_left_ = 0;              // tiles left in this round
-  std::size_t cursor_ = 0, looked_at_ = 0;  // tiles searched for pending corrections of the cells above them
-  RowId commit_row_ = 0;                    // next row whose plastic offsets are to be committed
+  // Search for tiles with a pending correction above them: the next tile, and tiles searched in vain.
+  std::size_t cursor_ = 0, looked_at_ = 0;
+  RowId commit_row_ = 0;  // next row whose plastic offsets are to be committed
   bool asleep_ = true, shadow_busy_ = false;
   bool left_to_shadow_ = false;  // a shadow relaxes the object
   NearRows near_;
@@ -267,14 +277,14 @@ class Relaxation {
   double small_patch_share_ = 1.0;
   int step_ = 0;                        // next step of a contact cycle, whose boxes are laid
   int plane_ = 0;                       // next plane of that step
-  bool any_source_ = false;             // the level has a pending correction
+  bool any_source_ = false;             // the cells that prolong in this step have a pending correction
   bool smoothed_ = false;               // the cycle skips smoothing on the way to coarse levels
   bool uncommitted_ = false;            // some plastic offset is not committed
   bool committing_ = false;             // offsets are being committed
   bool is_limited_correction_ = false;  // corrections move all voxels together (limited_correction.h)
   double residual_N_ = 0.0, running_residual_N_ = 0.0, tolerance_N_ = 0.0, least_residual_N_ = 0.0;
   float boundary_scale_ = 1.0F;
-  std::array<double, 3> drift_m_{}, furthest_m_{};  // of clusters, since wake()
+  std::array<double, 3> drift_m_{}, furthest_m_{};  // mean motion of clusters since wake(); its maximum
   float farthest_m_ = 0.0F;                         // a cell with a larger pending correction drops it
   int cycles_without_gain_ = 0;
   std::uint64_t cycles_ = 0;

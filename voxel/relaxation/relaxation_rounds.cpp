@@ -11,17 +11,18 @@ namespace voxel {
 
 namespace {
 
-constexpr std::uint64_t kLetGoEvery = 8;  // rounds
+constexpr std::uint64_t kLetGoEvery = 8;  // without gain, active limits are released once in this many rounds
 constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
-constexpr double kGain = 0.98;      // of the least residual so far: less is a gain
-constexpr double kNearRest = 10.0;  // times the tolerance: below this clusters at limits move together
-constexpr double kProgress = 1e-3;  // of the spacing: a cluster that moves further is not at rest
-// The same for links with next to no slack: the mean motion of all clusters on an axis exceeds its previous
-// maximum by this in a round. Not between surfaces, where squeezed tissue would keep moving.
+constexpr double kGain = 0.98;      // a residual below this share of the least one so far is a gain
+constexpr double kNearRest = 10.0;  // (unit: tolerance) below this residual clusters at limits are moved
+constexpr double kProgress = 1e-3;  // (unit: spacing) a cluster that moves further in a step is not at rest
+// The same for links with next to no slack (unit: spacing). The object is not at rest if the mean motion of
+// all clusters on an axis exceeds its previous maximum by this much in a round. This is not tested if
+// obstacles touch the object: tissue squeezed between them would keep moving.
 constexpr double kDrift = 2e-5;
-// Step through the voxels at active limits: which one is first in the next round.
+// Stride that selects the voxel at an active limit that is first in the next round.
 constexpr std::uint64_t kNextFirst = 7919;
 
 }  // namespace
@@ -66,7 +67,7 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
     const double force = cluster_steps_.move(multigrid_, state, v, axis, 0.5 * tolerance_N_);
     if (force == 0.0) return;
     most_N = std::max(most_N, force);
-    // Each step lowers the energy, though force may fall only after many of them.
+    // Each step lowers the energy, but the force may fall only after many steps.
     const auto way = static_cast<double>(state.u[static_cast<std::size_t>(axis)][v] - from);
     went[static_cast<std::size_t>(axis)] += way;
     ++moves;
@@ -74,7 +75,7 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
       cycles_without_gain_ = std::min(cycles_without_gain_, kPatience / 2 + 1);
     for (const VoxelId w : cluster_steps_.moved()) multigrid_.mark_dirty(0, w / kRow);
   };
-  // blocks that limits hold
+  // rigid blocks that limits hold
   for (std::size_t p = 0; multigrid_.has_blocks() && p < multigrid_.blocks().count(); ++p) {
     for (int axis = 0; axis < 3; ++axis) move(multigrid_.blocks().first(p), axis);
   }
@@ -99,20 +100,21 @@ double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstac
   return most_N;
 }
 
-// The end of a round over all that moves: is the object at rest?
+// Ends a round over everything that moves, and decides whether the object is at rest.
 void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, double residual_N) noexcept {
   residual_N = std::max(residual_N, static_cast<double>(multigrid_.bricks().unbalanced_N()));
-  // Only when little else moves: between other corrections they would undo one another and raise the energy.
+  // Clusters move only when little else does. Between other corrections their steps would undo one another
+  // and raise the energy.
   if (residual_N < kNearRest * tolerance_N_ || cycles_without_gain_ > kPatience / 2 ||
       multigrid_.has_blocks())
     residual_N = std::max(residual_N, step_clusters(state, obstacles));
-  // Active limits are released in every round only while rounds gain; else two sets of voxels could alternate
-  // without end.
+  // Active limits are released in every round only while rounds gain. Otherwise two active sets could
+  // alternate without end.
   //
-  // Pressed voxels and all their dependents move together (AdmmRegion): too much work for a tick. Beside a
-  // moving body each round is like the first. There only limits that no voxel pulls against are released:
-  // coarse levels would move such voxels off their limits and back. Beside fixed obstacles this is disabled:
-  // the per-voxel contact solver undoes the result in each tick.
+  // AdmmRegion moves pressed voxels and all their dependents together, which is too much work for a tick.
+  // Beside a moving body each round is like the first. In both cases only limits that no voxel pulls against
+  // are released: coarse levels would move the other voxels off their limits and back. Beside fixed obstacles
+  // AdmmRegion is not used, because the per-voxel contact solver would undo its result in each tick.
   if (obstacles.moving > 0 || (tool_presses_ && patient_ && obstacles.obstacles.empty())) {
     residual_N = std::max(residual_N, region_->relax(multigrid_, state, obstacles, {}));
     credit_ -= static_cast<std::int64_t>(region_->looked_at());
@@ -121,8 +123,8 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
     region_->forget(multigrid_);
     if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_active();
   }
-  // Scattered held voxels fix a cell more firmly than a patch of them. A cycle that ends worse than it began
-  // raises the factor of boundary springs.
+  // Scattered held voxels fix a cell more firmly than a patch of them. A round that ends worse than the one
+  // before raises the factor of boundary springs.
   if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
     boundary_scale_ = std::min(boundary_scale_ * kHarder, kHardest);
   } else {
@@ -140,7 +142,7 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   const bool at_rest =
       (residual_N_ < tolerance_N_ && multigrid_.bricks().round_ended()) || cycles_without_gain_ > kPatience;
   if (!at_rest) return;
-  // At rest plastic offsets are committed; then there is a new rest to be found.
+  // At rest plastic offsets are committed. Then the object has to find a new rest.
   if (uncommitted_) {
     committing_ = true;
     uncommitted_ = false;
@@ -164,7 +166,7 @@ std::uint64_t Relaxation::commit_plastic_offsets(Displacement& state, std::uint6
   return spent;
 }
 
-// Has a cell above the tile a pending correction?
+// True if a coarse cell above the tile has a pending correction.
 bool Relaxation::tile_waits_for_coarse(std::size_t number) const noexcept {
   constexpr int kSide = TileQueue::kSide;
   const TileQueue::Tile t = multigrid_.tiles().tile(number);

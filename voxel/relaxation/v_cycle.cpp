@@ -8,21 +8,22 @@ namespace voxel {
 namespace {
 
 constexpr int kCoarsestSweeps = 8;
-constexpr int kContactSweeps = 4;  // of a contact cycle's coarsest level, under asynchronous relaxation
-// Levels of a contact cycle under asynchronous relaxation; the shadow relaxes what is further away. If both
+constexpr int kContactSweeps = 4;  // sweeps on the coarsest level, under asynchronous relaxation
+// Levels of a contact cycle under asynchronous relaxation. The shadow relaxes tissue further away. If both
 // moved the coarsest cells, they would disturb one another.
 constexpr int kContactLevels = 5;
-// Cost of a Float8 of cells in Float8 prolonged: smoothed; restricted. Voxels, which have limits and
-// obstacles, cost twice as much.
+// Cost of smoothing and of restricting a Float8 of cells (unit: Float8 prolonged). kOfVoxels: factor for
+// voxels, which have limits and obstacles.
 constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
-// Cycles of all levels but the first before voxels get the correction; each costs an eighth of a whole cycle.
+// Further cycles on the coarse levels alone before voxels get the correction. Each costs an eighth of a whole
+// cycle.
 constexpr int kCoarseCycles = 2;
-constexpr int kRoundParts = 4;  // voxels
-// Levels that are visited twice in a cycle. Visited once, coarse levels leave an error of their own around a
+constexpr int kRoundParts = 4;  // voxels around a rigid block that its cycle relaxes
+// Levels that are visited twice in a cycle. If they were visited once, they would leave an error around a
 // held patch.
 constexpr int kFirstTwice = 2, kLastTwice = 3;
 constexpr int kAhead = 4;       // rows along y that are prefetched
-constexpr int kTileMargin = 3;  // cells around a tile that are smoothed, from level 1 on
+constexpr int kTileMargin = 3;  // cells around a tile that are smoothed from level 1 on
 
 }  // namespace
 
@@ -53,8 +54,8 @@ Relaxation::RowBox Relaxation::clipped(int level, const RowBox& b) const noexcep
 }
 
 // Lays the boxes of a cycle that relaxes voxels low … high. On each level they extend as far as a force in
-// the middle is felt: by `contact_margin` and a quarter of the width `wide`, in cells. A tile (no contact)
-// has its own voxels, and a few cells around it on coarse levels.
+// the middle is felt: by `contact_margin` and a quarter of the width `wide`, in cells. The boxes of a tile
+// (kNoContact) are its own voxels and, on coarse levels, its cells with a few around them.
 void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide,
                            int contact_margin, Visits visits) noexcept {
   visits_ = visits;
@@ -66,9 +67,9 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
       from[d] = std::max(0, (low[d] >> l) - margin);
       to[d] = std::min(multigrid_.grid(l).dims[d] - 1, (high[d] >> l) + margin);
     }
-    // Whole cells of the next level, so that a cell is restricted when all of its children are smoothed.
-    // Along x, a contact's cells on level 1 may have children that are not: making them whole would double
-    // the width there and gain nothing.
+    // The box is extended to whole cells of the next level, so that all children of a restricted cell are
+    // smoothed. The exception is level 0 around a contact along x: there the outermost cells may have
+    // children that are not smoothed. Whole cells would double the width and gain nothing.
     const bool narrow = wide != kNoContact && l == 0;
     const int pair = narrow ? 0 : 1;
     RowBox& s = boxes(l).smoothed;
@@ -87,8 +88,9 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
     boxes(l + 1).first_source = std::max(p.q0 * kLanes - 1, 0);
     boxes(l + 1).last_source = p.q1 * kLanes + kLanes;
     if (!narrow) continue;
-    // Around a contact along x only to the smoothed Float8 and one more on either side. If a smoothed Float8
-    // got half of a correction, smoothing would make up for the other half, which would then be added again.
+    // Around a contact, corrections along x reach the smoothed Float8 and one more on either side. If a
+    // smoothed Float8 got half of a correction, smoothing would make up for the other half, which would then
+    // be added again.
     prolonged.q0 = std::max(prolonged.q0, s.q0 - 1);
     prolonged.q1 = std::min(prolonged.q1, s.q1 + 1);
     boxes(l + 1).first_source = std::max(s.q0 * kLanes / 2 - 1, 0);
@@ -101,7 +103,7 @@ std::size_t Relaxation::groups(const RowBox& b) {
          static_cast<std::size_t>(b.k1 - b.k0 + 1);
 }
 
-// Float8 smoothed and prolonged; empty ones count, too.
+// Number of Float8 smoothed and prolonged in a cycle. Empty ones count, too.
 std::size_t Relaxation::octets_of_cycle() const noexcept {
   std::size_t sum = 0;
   for (const Step& step : steps_now()) {
@@ -146,7 +148,7 @@ void Relaxation::add_steps(std::vector<Step>& to, int level, Visits visits, bool
   to.push_back({level, Step::smooths_after});
 }
 
-// In Float8 prolonged.
+// Work of step n (unit: Float8 prolonged).
 std::size_t Relaxation::work_of_step(int n) const noexcept {
   const Step step = step_of(n);
   const LevelBoxes& b = boxes_[static_cast<std::size_t>(step.level)];
@@ -170,9 +172,9 @@ std::size_t Relaxation::work_of_step(int n) const noexcept {
   return each * groups(prolonged);
 }
 
-// Red-black by rows: first one colour, then the other, one plane behind while its memory is in the cache. The
-// result is the same to the last bit as one colour after the other: along x a row's neighbours have its own
-// colour, and come in the same order.
+// Red-black smoothing by rows. The second colour follows one plane behind the first, while that plane is in
+// the cache. The result is bit for bit that of one colour after the other: along x a row's neighbours have
+// its own colour, and come in the same order.
 void Relaxation::smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
                             Look look, Planes planes) noexcept {
   const RowBox& all = boxes(level).smoothed;
@@ -205,8 +207,8 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
 }
 
 // Prolongs the pending corrections of the next coarser level within the boxes. Cells beside the box always
-// prolong, however small their correction: nothing relaxes their children here, and children left behind
-// would act on the box like a force, four times as much on each coarser level.
+// prolong, however small their correction is, because nothing relaxes their children here. Children left
+// behind would act on the box like a force, four times as much on each coarser level.
 void Relaxation::prolong_box(int level, Displacement& state, const ObstacleView& obstacles,
                              Planes planes) noexcept {
   if (planes.first == 0) any_source_ = mark_source_cells(level, state, obstacles);
@@ -228,7 +230,7 @@ bool Relaxation::mark_source_cells(int level, Displacement& state, const Obstacl
     const float most =
         multigrid_.pending_correction(level + 1, row, span, b.first_source - origin, b.last_source - origin);
     if (most <= multigrid_.restricted_m()) return;
-    // Between obstacles coarse cells can run away under active limits.
+    // Under active limits, coarse cells between obstacles can diverge.
     if (!(most <= farthest_m_) && !is_limited_correction_) {
       multigrid_.forget_pending_correction(level + 1, row, state, obstacles);
       return;
@@ -273,8 +275,8 @@ int Relaxation::planes_of_step(int n) const noexcept {
 void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleView& obstacles, Look look,
                       bool smoothed) noexcept {
   const Step step = step_of(n);
-  // Pending corrections come first: a step between corrected voxels and others would look like a force to the
-  // cells above.
+  // Pending corrections are prolonged first. Otherwise the jump between corrected voxels and others would
+  // look like a force to coarse cells.
   for (int l = last_level() - 1; n == 0 && planes.first == 0 && l >= 0; --l)
     prolong_box(l, state, obstacles, kAllPlanes);
   const RigidBlocks::Box box = cells(boxes(step.level).smoothed);
@@ -305,8 +307,8 @@ void Relaxation::step(int n, Planes planes, Displacement& state, const ObstacleV
   }
 }
 
-// Prefetches the children of the row kAhead further, in the last two planes of the finer level; the planes
-// before are in the cache.
+// Prefetches rows of the finer level, kAhead rows beyond the children of `row`. They lie in the last two
+// planes that a restriction reads; the planes before are in the cache.
 void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& state) const noexcept {
   const Grid& finer = multigrid_.grid(level - 1);
   const RowId first = multigrid_.rows_below(level, row)[0] + finer.row_z + kAhead;
@@ -319,7 +321,7 @@ void Relaxation::fetch_ahead_below(int level, RowId row, const Displacement& sta
 void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleView& obstacles, Look look,
                                    Planes planes) noexcept {
   const bool begins = planes.first == 0;
-  // Before forces are summed, so that the residual is that of plastic links.
+  // Plastic offsets are updated before forces are summed, so that the residual is that of plastic links.
   if (l == 0 && lattice_.has_plasticity() && begins) {
     for_rows(0, boxes(0).smoothed, [&](RowId row, LaneSpan, int, int) {
       if (look == Look::all_rows || multigrid_.has(0, row, Multigrid::active | Multigrid::dirty))
@@ -331,7 +333,7 @@ void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleVie
   parents.k0 = all.k0 + planes.first;
   parents.k1 = std::min(all.k0 + planes.last, all.k1);
   const Grid& g = multigrid_.grid(l + 1);
-  // All values before any load: a row's load depends on its neighbours' values.
+  // All values are restricted before any load, because a row's load depends on its neighbours' values.
   for_rows(l + 1, begins ? all : RowBox{}, [&](RowId row, LaneSpan span, int, int) {
     if (look == Look::active_rows) {
       if (!restrict_due(l + 1, row)) return;
@@ -340,8 +342,8 @@ void Relaxation::restrict_residual(int l, Displacement& state, const ObstacleVie
            {row, row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x})
         multigrid_.mark(l + 1, r, Multigrid::renewed);
     }
-    // Under asynchronous relaxation coarse cells hold only motion since the residual was frozen, which they
-    // know themselves.
+    // Under asynchronous relaxation coarse cells hold only the motion since the residual was frozen. They
+    // have that value already.
     if (!left_to_shadow_) multigrid_.restrict_values(l + 1, row, state, span);
   });
   if (begins) {
@@ -380,8 +382,8 @@ std::size_t Relaxation::run_whole_coarse_first(Displacement& state, const Obstac
 
 void Relaxation::run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept {
   multigrid_.restrict_all(true);
-  const int first_coarse = 2;         // level 1 is smoothed before
-  const int of_voxels = steps() - 2;  // voxels get the correction
+  const int first_coarse = 2;         // index of the first step on level 1
+  const int of_voxels = steps() - 2;  // index of the step that prolongs to voxels
   run_steps_over(0, of_voxels, state, obstacles, Look::all_rows);
   for (int n = 0; n < kCoarseCycles; ++n)
     run_steps_over(first_coarse, of_voxels, state, obstacles, Look::all_rows);

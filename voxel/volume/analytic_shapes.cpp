@@ -9,7 +9,8 @@
 namespace voxel {
 namespace {
 
-// Tolerance that treats centres on a boundary alike on every side of a shape. (unit: spacing)
+// Rounding tolerance (unit: spacing). With it, a voxel centre on a boundary is treated alike on every side of
+// a shape.
 constexpr double kRounding = 1e-9;
 
 constexpr std::array<char, 3> kAxis{'x', 'y', 'z'};
@@ -68,7 +69,7 @@ LabelVolume empty_lattice(const Formula& formula, std::size_t max_voxels) {
              " m, so it has no voxel; make the spacing smaller");
     }
   }
-  // In double, because the product may exceed any integer type.
+  // The product is a double, because it may exceed any integer type.
   const double total = counts[0] * counts[1] * counts[2];
   constexpr double kLongest = 1e9;  // an axis must fit in an int
   if (!(total <= static_cast<double>(max_voxels)) || std::max({counts[0], counts[1], counts[2]}) > kLongest) {

@@ -11,7 +11,7 @@
 
 namespace voxel {
 
-// Sizes and positions in meters, from the middle of the volume.
+// Positions count from the middle of the volume.
 struct Inclusion {
   enum class Shape : std::uint8_t { box, ball } shape = Shape::ball;
   glm::dvec3 centre_m{0.0};  // from the middle of the volume
@@ -30,7 +30,7 @@ struct Formula {
   glm::dvec3 spacing_m{1e-3};
   std::uint8_t label = 1;
   std::vector<Layer> layers;          // block only; above the last layer the block has `label`
-  std::vector<Inclusion> inclusions;  // later ones win
+  std::vector<Inclusion> inclusions;  // a later inclusion overwrites an earlier one
 };
 
 // A voxel is filled when its centre lies in the shape; a block of size s at spacing h has round(s/h) voxels

@@ -27,17 +27,17 @@ constexpr std::uint32_t kDoubles = 0x7fe00009U;
 constexpr std::uint32_t kTransferSyntax = 0x00020010U;
 constexpr std::uint32_t kFrames = 0x00280008U;
 constexpr std::uint32_t kBits = 0x00280100U;
-constexpr std::size_t kMostFrames = 1'000'000;  // a header that says more is broken
+constexpr std::size_t kMostFrames = 1'000'000;  // a header that states more is broken
 
 // One element's header. DICOM PS3.5, chapter 7.
 struct Element {
   std::uint32_t tag = 0;
-  std::string type;  // the two letters of its value representation; empty where implicit
+  std::string type;  // the two letters of the value representation; empty if the element is implicit
   std::uint32_t length = 0;
 };
 
-// Value representations whose length takes four bytes, and those where it takes two (PS3.5, 7.1.2). GDCM
-// guesses the length of an element of any other.
+// Value representations with a length field of four bytes, and those with a length field of two (PS3.5,
+// 7.1.2). GDCM guesses the length of an element with any other representation.
 constexpr std::array<const char*, 13> kLongTypes{"OB", "OD", "OF", "OL", "OV", "OW", "SQ",
                                                  "SV", "UC", "UN", "UR", "UT", "UV"};
 constexpr std::array<const char*, 21> kShortTypes{"AE", "AS", "AT", "CS", "DA", "DS", "DT",
@@ -49,8 +49,8 @@ bool is_one_of(const std::array<const char*, Count>& types, const std::string& t
   return std::any_of(types.begin(), types.end(), [&](const char* other) { return type == other; });
 }
 
-// Walks sequences and items flat: after the header of a sequence or an item, its content follows as elements.
-// A stack holds the sequences and items that are open, whether a length or a delimiter ends them.
+// Walks nested elements without recursion: the content of a sequence or an item is read as the next elements.
+// A stack holds the open sequences and items. Each ends at its stated length or at a delimiter.
 class Walker {
  public:
   explicit Walker(const std::filesystem::path& path) : path_(path), file_(path, std::ios::binary) {
@@ -82,8 +82,8 @@ class Walker {
  private:
   [[nodiscard]] std::uint64_t left() const { return bytes_ > at_ ? bytes_ - at_ : 0; }
 
-  // Does the file begin with an element of group 2 or 8, as a file does that lacks its preamble? Then without
-  // a group 2 the elements are implicit if the first one names no type.
+  // True if the file begins with an element of group 2 or 8, as DICOM without its preamble does. Sets
+  // `implicit_` if that element names no type. A transfer syntax in group 2 overrides `implicit_` later.
   bool begins_with_element() {
     file_.clear();
     file_.seekg(0);
@@ -96,7 +96,7 @@ class Walker {
     const std::string type{static_cast<char>(start[4]), static_cast<char>(start[5])};
     const bool typed = is_one_of(kLongTypes, type) || is_one_of(kShortTypes, type);
     implicit_ = !typed;
-    // An implicit first element is short: a length of group, a character set, a kind of image.
+    // An implicit first element is short, such as the group length, the character set or the image type.
     const bool is_short = start[5] == 0 && start[6] == 0 && start[7] == 0 && start[4] <= 64;
     return (group == 2 || group == 8) && element <= 0x0100 && (typed || is_short);
   }
@@ -193,7 +193,7 @@ class Walker {
       refuse_volume(path_, "there is no DICOM element at byte ", at_, "; ", kDamaged);
     }
     if (element.length == kUndefined) {
-      // Pixels of undefined length are packed into fragments, those of an icon in a sequence, too.
+      // Pixels of undefined length are packed into fragments, also those of an icon inside a sequence.
       open_.push_back({kNoEnd, implicit_, element.tag == kPixels});
       // The content of an element of type UN and undefined length is implicit (PS3.5, 6.2.2).
       if (element.type == "UN") implicit_ = true;
@@ -231,7 +231,7 @@ class Walker {
     found_.frames = frames < 1 ? 1 : static_cast<std::size_t>(frames);
   }
 
-  // An implicit element has no type. As GDCM does, a sequence is recognised by its first bytes.
+  // An implicit element has no type. So a sequence is recognised by its first bytes, as in GDCM.
   bool begins_with_item(const Element& element) {
     if (element.length < 8) return false;
     const std::uint64_t start = at_;
@@ -264,7 +264,8 @@ class Walker {
 
   static constexpr std::uint64_t kNoEnd = ~std::uint64_t{0};
 
-  // A sequence or item. An item of known length needs no entry: its sequence has one.
+  // An open sequence, item or packed pixel element. An item of known length needs no entry, because its
+  // sequence has one.
   struct Open {
     std::uint64_t end = kNoEnd;  // (unit: byte) in the file; kNoEnd if a delimiter ends it
     bool implicit_outside = false;

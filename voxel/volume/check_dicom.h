@@ -11,20 +11,20 @@ namespace voxel {
 
 enum class DicomKind {
   none,
-  without_image,  // a directory, a report
+  without_image,  // such as a directory or a report
   image
 };
 
-// What the elements of a file say about its pixels.
+// Properties of a file's pixels, as its elements state them.
 struct DicomFile {
   DicomKind kind = DicomKind::none;
   std::size_t frames = 1;        // as the header says
-  bool big_endian = false;       // numbers of the file begin with their high byte
+  bool big_endian = false;       // the high byte of a number comes first
   bool pixels_as_bytes = false;  // the pixels are stated as bytes (OB), not as 16-bit words (OW)
 };
 
 // Walks the elements of a file without keeping them. Throws VolumeError if an element is longer than the rest
-// of the file. A file without the preamble that marks DICOM is known by its first element.
+// of the file. A file without the DICOM preamble is recognised by its first element.
 DicomFile check_dicom(const std::filesystem::path& path);
 
 }  // namespace voxel

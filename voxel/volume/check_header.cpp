@@ -68,7 +68,7 @@ VoxelPlace inspect_volume(const fs::path& path, VolumeFormat format) {
 
 void check_file_size(const fs::path& path, const VoxelPlace& place, VolumeHeader& header) {
   const std::uint64_t left = place.file_bytes > place.offset ? place.file_bytes - place.offset : 0;
-  // As text, a voxel of up to eight bytes takes at least one digit and a blank.
+  // As text, a voxel takes at least one digit and a blank. In memory it takes at most eight bytes.
   const bool raw = place.packing == VoxelPlace::Packing::raw;
   const double most = raw ? 1.0 : place.packing == VoxelPlace::Packing::text ? 8.0 : kMostPacked;
   const std::uint64_t needed = bytes_in_file(place, header);

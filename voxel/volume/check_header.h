@@ -24,25 +24,25 @@ inline constexpr const char* kVolumeFormats =
 inline constexpr const char* kDamaged =
     "the file is damaged, incomplete or not what its name says: copy or export it again";
 
-// Deflate packs at most 1,032 bytes into one byte; with some margin.
+// Largest ratio of unpacked to packed size. Deflate reaches 1,032; the rest is margin.
 inline constexpr double kMostPacked = 1100.0;
 
-// The format by the ending of the name. Throws VolumeError.
+// Selects the format by the ending of the name. Throws VolumeError.
 VolumeFormat format_of(const std::filesystem::path& path);
 
 // Location and encoding of the voxels of a file, and their frame.
 struct VoxelPlace {
   enum class Packing { raw, text, deflate, other };
   std::filesystem::path file;    // the header's own file, or a file beside it
-  std::uint64_t file_bytes = 0;  // of `file`
-  std::uint64_t offset = 0;   // (unit: byte) in `file` before the voxels (raw), or before the packed stream
-  std::uint64_t skipped = 0;  // (unit: byte) before the voxels inside the packed stream
+  std::uint64_t file_bytes = 0;  // size of `file`
+  std::uint64_t offset = 0;      // bytes in `file` before the voxels (raw) or before the packed stream
+  std::uint64_t skipped = 0;     // bytes of the unpacked stream before the voxels
   Packing packing = Packing::raw;
   bool swapped = false;                 // byte order differs from this machine's
-  bool as_they_are = true;              // raw or deflate: the voxels can be streamed
+  bool as_they_are = true;              // false: only the format's library finds the voxels
   double slope = 1.0, intercept = 0.0;  // intensity = slope · stored number + intercept
-  // Type and frame of the voxels, as NIfTI and NRRD headers state them; absent for MetaImage, whose library
-  // reads them right.
+  // Component type of the voxels, as the NIfTI or NRRD header states it. A MetaImage header is read by its
+  // library, which sets the type and the frame.
   std::optional<Component> stored;
   FileFrame frame;               // in the header's length unit
   std::optional<double> unit_m;  // length unit that the header states

@@ -15,7 +15,7 @@ namespace voxel {
 class ConnectedRuns {
  public:
   struct Run {
-    int first = 0, last = 0;  // voxels of the row, inclusive
+    int first = 0, last = 0;  // first and last voxel in the row, inclusive
     std::uint32_t piece = 0;
   };
   ConnectedRuns(const LabelVolume& volume, const std::vector<bool>& chosen);

@@ -33,7 +33,7 @@ std::string text_of(const gdcm::DataSet& set, const Tag& tag) {
   return text;
 }
 
-// The numbers of a decimal string; empty if one of them is none.
+// The numbers of a decimal string; empty if any entry is not a number.
 std::vector<double> numbers_of(const gdcm::DataSet& set, const Tag& tag) {
   const std::string text = text_of(set, tag);
   std::vector<double> values;
@@ -48,7 +48,7 @@ std::vector<double> numbers_of(const gdcm::DataSet& set, const Tag& tag) {
   return values;
 }
 
-// Items of a sequence; empty if there is none.
+// Items of a sequence; empty if there is no such sequence.
 class DicomItems {
  public:
   DicomItems(const gdcm::DataSet& set, const Tag& tag) {
@@ -64,7 +64,8 @@ class DicomItems {
   gdcm::SmartPointer<gdcm::SequenceOfItems> items_;
 };
 
-// Where the elements of each frame are: in the file itself, or in groups for all frames and for each.
+// Finds the elements of a frame. They lie in the file itself or in functional groups: one for each frame and
+// one that all frames share.
 class FrameElements {
  public:
   explicit FrameElements(const gdcm::DataSet& set)
@@ -95,7 +96,7 @@ class FrameElements {
 };
 
 void open_dicom(const fs::path& path, gdcm::ImageReader& reader) {
-  gdcm::ImageHelper::SetForceRescaleInterceptSlope(true);  // of every kind of image that states them
+  gdcm::ImageHelper::SetForceRescaleInterceptSlope(true);  // reads both from every kind of image
   reader.SetFileName(path.c_str());
   if (!reader.Read())
     refuse_volume(path, "the slice cannot be read: the DICOM library does not understand its image; ",
@@ -124,7 +125,7 @@ Component stored_component(const fs::path& path, const gdcm::PixelFormat& format
   }
 }
 
-// The axes of a plane from its two directions, which headers round. Throws VolumeError.
+// The axes of a plane from its direction cosines, which headers round. Throws VolumeError.
 glm::dmat3 axes_of(const fs::path& path, const std::vector<double>& cosines) {
   constexpr double kCosineRounding = 0.01;  // cosines have a few digits
   const glm::dvec3 row(cosines[0], cosines[1], cosines[2]), column(cosines[3], cosines[4], cosines[5]);
@@ -140,7 +141,7 @@ glm::dmat3 axes_of(const fs::path& path, const std::vector<double>& cosines) {
   return {x, glm::cross(normal, x), normal};
 }
 
-// Spacing of columns and rows. Throws VolumeError if it is 0 or less.
+// Reads the pixel spacing and the slice thickness. Throws VolumeError if a pixel spacing is not above 0.
 void read_pixel_spacing(const fs::path& path, const FrameElements& elements, std::size_t n,
                         const gdcm::DataSet& set, const gdcm::Image& image, DicomFrame& frame) {
   const Tag measures(0x0028, 0x9110);
@@ -151,11 +152,11 @@ void read_pixel_spacing(const fs::path& path, const FrameElements& elements, std
                   "; it must be above 0. Correct the header or export the series again");
   }
   if (spacing.size() >= 2) {
-    frame.plane.spacing.x = spacing[1];  // the header states rows first
+    frame.plane.spacing.x = spacing[1];  // the header states the spacing of rows first
     frame.plane.spacing.y = spacing[0];
     frame.has_spacing = true;
   } else if (!elements.in_groups()) {
-    // GDCM knows where other kinds of image state it, and puts 1 mm in the place of none.
+    // GDCM knows where other kinds of image state their spacing. If there is none, it gives 1 mm.
     frame.plane.spacing.x = image.GetSpacing(0);
     frame.plane.spacing.y = image.GetSpacing(1);
     frame.has_spacing = !text_of(set, Tag(0x0018, 0x1164)).empty() || frame.plane.spacing.x != 1.0 ||
@@ -172,7 +173,8 @@ void read_plane(const fs::path& path, const FrameElements& elements, std::size_t
   std::vector<double> cosines = elements.numbers(n, Tag(0x0020, 0x9116), kOrientation);
   frame.has_position = position.size() == 3;
   frame.has_orientation = cosines.size() == 6;
-  // GDCM knows where other kinds of image state them; where none does, it gives the origin and the axes.
+  // GDCM knows where other kinds of image state their position and orientation. If they state none, GDCM
+  // gives the origin and the axes of the coordinate system.
   if (!frame.has_position) position.assign(image.GetOrigin(), image.GetOrigin() + 3);
   if (!frame.has_orientation) cosines.assign(image.GetDirectionCosines(), image.GetDirectionCosines() + 6);
   frame.plane.origin = {position[0], position[1], position[2]};
@@ -193,7 +195,7 @@ void read_rescaling(const fs::path& path, const FrameElements& elements, std::si
                 ", so that all voxels would be alike; correct the header or export the series again");
 }
 
-// Steps between the frames of a file that states one place for all: a dose, or a stack of evenly spaced
+// Places the frames of a file that states one place for all of them: a dose, or a stack of evenly spaced
 // frames.
 void place_frames(const fs::path& path, const gdcm::DataSet& set, std::vector<DicomFrame>& frames) {
   const glm::dvec3 normal = frames[0].plane.direction[2];
@@ -202,7 +204,7 @@ void place_frames(const fs::path& path, const gdcm::DataSet& set, std::vector<Di
   for (std::size_t n = 0; n < frames.size(); ++n) {
     double height = 0.0;
     if (offsets.size() == frames.size()) {
-      // Offsets count from the first frame, or are places along z.
+      // Offsets are relative to the first frame, or they are coordinates along z.
       height = offsets[n] - offsets[0];
     } else if (!step.empty() && step[0] != 0.0) {
       height = static_cast<double>(n) * step[0];
@@ -217,8 +219,8 @@ void place_frames(const fs::path& path, const gdcm::DataSet& set, std::vector<Di
   }
 }
 
-// The numbers of big-endian files: GDCM turns the 16-bit words of pixels that are stated as words, and none
-// of those that are stated as bytes.
+// Brings numbers of a big-endian file into this machine's byte order. If the pixels are stated as words, GDCM
+// has already swapped the bytes of each 16-bit word. If they are stated as bytes, it has swapped nothing.
 void turn_numbers(std::vector<std::byte>& numbers, std::size_t size, bool as_bytes) {
   const std::size_t word = as_bytes ? 1 : 2;
   if (size <= word) return;

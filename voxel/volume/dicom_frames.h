@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Frames of one DICOM file, read by GDCM. Internal to the readers (read_volume.h). Call in a child process
-// only (subprocess.h): GDCM may abort. A classic file has one frame; an enhanced one has as many as it has
-// slices, each with a place, an orientation, a pixel spacing and a rescaling of its own.
+// only (subprocess.h): GDCM may abort. A classic file has one frame. An enhanced file has one frame per
+// slice, and each has its own place, orientation, pixel spacing and rescaling.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,7 @@ namespace voxel {
 struct DicomFrame {
   FileFrame plane;  // one slice; spacing.z is its thickness, 0 if not stated
   Component stored = Component::int16;
-  double lowest = 0.0, highest = 0.0;  // of the stored numbers, by their count of bits
+  double lowest = 0.0, highest = 0.0;  // range of the stored numbers, from their number of bits
   double slope = 1.0, intercept = 0.0;
   bool has_spacing = false, has_position = false, has_orientation = false;
 };
@@ -30,7 +30,8 @@ struct DicomHeader {
 // Throws VolumeError.
 DicomHeader read_dicom_frames(const std::filesystem::path& path, const DicomFile& file);
 
-// Stored numbers of all frames, in this machine's byte order. Throws VolumeError if they are not `bytes`.
+// Stored numbers of all frames, in this machine's byte order. Throws VolumeError if their size is not
+// `bytes`.
 std::vector<std::byte> read_dicom_numbers(const std::filesystem::path& path, const DicomFile& file,
                                           Component stored, std::size_t bytes);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The headers of the three formats, one function each. Internal to the readers (read_volume.h).
+// Reads the headers of the three formats, one function each. Internal to the readers (read_volume.h).
 #pragma once
 
 #include <filesystem>

@@ -24,7 +24,7 @@ void inspect_meta(const fs::path& path, VoxelPlace& place) {
   place.offset += bytes_to_skip(path, header, "headersize");
   if (header.number("headersize", 0.0) < 0.0)
     place.as_they_are = false;  // the voxels are at the end of the file
-  // MetaIO takes the size of a voxel for the step between voxels where the header gives no step.
+  // If the header gives no step between voxels, MetaIO takes the size of a voxel for it.
   if (!header.has("elementspacing") && !header.has("elementsize")) place.notes.emplace_back(kNoSpacing);
   if (header.has("distanceunits") && header.text("distanceunits") != "?") {
     place.stated_unit = header.text("distanceunits");

@@ -118,7 +118,7 @@ Component nifti_component(const fs::path& path, const NiftiHeader& header) {
                 ", where one whole or real number is needed; save one channel of it");
 }
 
-// Sizes and voxel sizes of the first three axes.
+// Reads the number of voxels and the voxel size along the first three axes.
 void read_nifti_axes(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
   const int axes = header.at<std::int16_t>(40);
   check_axes(path, axes);
@@ -151,7 +151,7 @@ void read_nifti_axes(const fs::path& path, const NiftiHeader& header, VoxelPlace
   }
 }
 
-// Method 2 of nifti1.h: a rotation and the voxel sizes.
+// Method 2 of nifti1.h: the steps are a rotation times the voxel sizes.
 NiftiAffine affine_of_qform(const NiftiHeader& header, const glm::dvec3& spacing) {
   double b = header.real(256), c = header.real(260), d = header.real(264);
   const double rest = 1.0 - b * b - c * c - d * d;
@@ -173,7 +173,7 @@ NiftiAffine affine_of_qform(const NiftiHeader& header, const glm::dvec3& spacing
   return affine;
 }
 
-// Method 3 of nifti1.h: any steps.
+// Method 3 of nifti1.h: the steps are arbitrary vectors.
 NiftiAffine affine_of_sform(const NiftiHeader& header) {
   NiftiAffine affine;
   for (int row = 0; row < 3; ++row) {
@@ -187,7 +187,7 @@ NiftiAffine affine_of_sform(const NiftiHeader& header) {
 
 // Are the steps at right angles, and as long as the header's voxel sizes?
 bool is_rectangular(const NiftiAffine& affine, const glm::dvec3& spacing, std::size_t axes) {
-  constexpr double kStepRounding = 1e-3;  // of a voxel; headers hold single precision
+  constexpr double kStepRounding = 1e-3;  // relative; headers hold single precision
   for (int a = 0; a < static_cast<int>(axes); ++a) {
     const double length = glm::length(affine.steps[a]);
     if (!(std::abs(length - spacing[a]) <= kStepRounding * spacing[a])) return false;
@@ -200,7 +200,7 @@ bool is_rectangular(const NiftiAffine& affine, const glm::dvec3& spacing, std::s
   return true;
 }
 
-// Do both put a voxel in different places? Programs differ in which of the two they use.
+// True if qform and sform put a voxel in different places. Programs differ in which of the two they use.
 bool differ(const NiftiAffine& p, const NiftiAffine& q, const glm::dvec3& spacing) {
   const double size = std::max({spacing.x, spacing.y, spacing.z});
   double off = 0.0;
@@ -212,8 +212,8 @@ bool differ(const NiftiAffine& p, const NiftiAffine& q, const glm::dvec3& spacin
   return off > 0.01 * size;
 }
 
-// The frame in LPS. The sform counts if it is rectangular and says scanner coordinates, or if it is alone;
-// else the qform does. This is the choice of ITK, whose programs then show the same place.
+// Sets the frame in LPS. The sform is used if it is rectangular and gives scanner coordinates, or if there is
+// no qform. Otherwise the qform is used. ITK chooses in the same way, so its programs show the same place.
 void read_nifti_frame(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
   constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
   check_nifti_frame(path, header);
@@ -265,8 +265,8 @@ void read_nifti_unit(const NiftiHeader& header, VoxelPlace& place) {
   place.stated_unit = "unit number " + std::to_string(header.bytes[123] & 7U);
 }
 
-// A slope of 0 means that the numbers are not scaled, and the intercept counts for nothing. SPM writes NaN
-// for it.
+// A slope of 0 means that the numbers are not scaled and the intercept is ignored. SPM writes NaN instead of
+// 0.
 void read_nifti_scaling(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
   const double slope = header.real(112), intercept = header.real(116);
   if (slope == 0.0 || std::isnan(slope)) return;
@@ -291,7 +291,7 @@ void inspect_nifti(const fs::path& path, VoxelPlace& place) {
   if (ends_with(lower_case(path.string()), ".gz")) place.packing = VoxelPlace::Packing::deflate;
   const double offset = header.real(108);
   const double most = place.packing == VoxelPlace::Packing::raw ? 1.0 : kMostPacked;
-  // 0 is common: the voxels follow the header and its four bytes of extension flags.
+  // An offset of 0 is common. The voxels then follow the header directly.
   if (!(offset >= 0.0 && offset <= most * static_cast<double>(place.file_bytes)))
     refuse_volume(path, "the header says the voxels begin at byte ", offset, "; ", kDamaged);
   const auto begin = std::max<std::uint64_t>(static_cast<std::uint64_t>(offset), kNiftiBytes);

@@ -18,13 +18,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// "header cannot be read: ..."
+// Throws VolumeError: "the header cannot be read: …".
 template <typename... Parts>
 [[noreturn]] void refuse_header(const fs::path& path, const Parts&... parts) {
   refuse_volume(path, "the header cannot be read: ", parts..., "; ", kDamaged);
 }
 
-// Words between blanks. A word in quotes or in round brackets may hold blanks; the quotes are dropped.
+// Splits a text at blanks. A word in quotes or in round brackets may hold blanks; the quotes are dropped.
 std::vector<std::string> words_between_blanks(const std::string& text) {
   std::vector<std::string> words;
   std::string word;
@@ -52,7 +52,7 @@ std::vector<std::string> words_between_blanks(const std::string& text) {
   return words;
 }
 
-// The numbers of "(1,0,0)". Throws VolumeError.
+// The numbers of a vector such as "(1,0,0)". Throws VolumeError.
 std::vector<double> vector_of(const fs::path& path, const std::string& key, const std::string& word) {
   std::vector<double> values;
   const char* at = word.c_str() + 1;
@@ -76,13 +76,14 @@ double number_of(const fs::path& path, const std::string& key, const std::string
   return value;
 }
 
-// The directions of the three coordinates of a space, as factors that turn them into left, back and head.
+// The directions of the three coordinates of a space, as factors that turn them into LPS coordinates.
 struct NrrdSpace {
   glm::dvec3 to_lps{1.0};
   bool known = true;
 };
 
-// Spaces in every spelling: long or short, with blanks, hyphens or neither, with or without time.
+// The space that a header names. Its name may be long or short, with blanks, hyphens or neither, and with or
+// without time.
 NrrdSpace space_of(const fs::path& path, const std::string& text, VoxelPlace& place) {
   std::string name;
   for (const char c : lower_case(text)) {
@@ -115,11 +116,11 @@ NrrdSpace space_of(const fs::path& path, const std::string& text, VoxelPlace& pl
 // One axis of the file.
 struct NrrdAxis {
   double size = 0.0;
-  bool of_space = true;      // no list of components, no time
+  bool of_space = true;      // false for an axis of components or of time
   std::vector<double> step;  // space direction; empty if the header gives none
 };
 
-// Kinds of axes that are not places: components, colours, time. Source: the format's table of kinds.
+// False for an axis of components, colours or time. Source: the format's table of kinds.
 bool is_kind_of_space(const std::string& kind) {
   const std::string word = lower_case(kind);
   return word == "space" || word == "domain" || word == "???" || word == "none" || word.empty();
@@ -203,8 +204,8 @@ Component nrrd_component(const fs::path& path, const TextHeader& header) {
   return found->second;
 }
 
-// The length units of a list of words: one for each axis, or for each coordinate of the space. Sets
-// `place.stated_unit` to the first that is stated.
+// The length units that a field lists: one for each axis, or for each coordinate of the space. Sets
+// `place.stated_unit` to the first unit that is stated.
 std::vector<std::optional<double>> nrrd_units(const TextHeader& header, const char* key, VoxelPlace& place) {
   std::vector<std::optional<double>> units;
   for (const std::string& word : words_between_blanks(header.text(key))) {
@@ -214,8 +215,8 @@ std::vector<std::optional<double>> nrrd_units(const TextHeader& header, const ch
   return units;
 }
 
-// One factor for all coordinates, which becomes the unit of the frame, or one for each: then the frame is
-// turned into millimeters.
+// Factors for the three coordinates. They are 1 if all coordinates have one unit, which becomes the unit of
+// the frame. Otherwise they turn the frame into millimeters.
 struct NrrdScale {
   glm::dvec3 factor{1.0};
 };
@@ -233,8 +234,8 @@ NrrdScale common_unit(const std::vector<double>& units_m, VoxelPlace& place) {
   return scale;
 }
 
-// Units of the first three entries of a list that count; an entry without a unit is in millimeters. Empty if
-// none names a known unit.
+// The units at the given entries of a list. An entry without a known unit counts as millimeters. Empty if no
+// entry has a known unit.
 std::vector<double> stated_units(const std::vector<std::optional<double>>& units,
                                  const std::vector<std::size_t>& entries) {
   std::vector<double> out;
@@ -247,7 +248,7 @@ std::vector<double> stated_units(const std::vector<std::optional<double>>& units
   return any ? out : std::vector<double>{};
 }
 
-// Axes by vectors in a space.
+// Reads axes that the header gives as vectors in a space.
 void read_oriented_frame(const fs::path& path, const TextHeader& header, const std::vector<NrrdAxis>& axes,
                          const std::vector<std::size_t>& places, VoxelPlace& place) {
   NrrdSpace space{glm::dvec3(1.0), false};
@@ -282,7 +283,7 @@ void read_oriented_frame(const fs::path& path, const TextHeader& header, const s
   if (places.size() < 3) complete_axes(place.frame, places.size());
 }
 
-// Axes by spacings alone: nothing says where they point.
+// Reads axes for which the header gives spacings alone and no directions.
 void read_plain_frame(const fs::path& path, const TextHeader& header, const std::vector<std::size_t>& places,
                       VoxelPlace& place) {
   const std::vector<std::string> spacings = words_between_blanks(header.text("spacings")),

@@ -138,7 +138,7 @@ class Thinner {
     }
   }
 
-  // Are all voxels within the shell's thickness, corners included, stiff?
+  // True if all voxels within the shell's thickness are stiff, corners included.
   [[nodiscard]] bool is_inside(int i, int j, int k) {
     const int s = options_.shell;
     const std::array<int, 3>& n = volume().dims;
@@ -232,7 +232,7 @@ class Thinner {
   ThinningOptions options_;
   Thinned result_;
   std::map<std::size_t, std::uint32_t> restored_;  // restored voxel → the component that it joins
-  std::array<std::uint8_t, 256> removed_label_{}, original_{};  // [stiff label], [removed label]
+  std::array<std::uint8_t, 256> removed_label_{}, original_{};  // by stiff label; by removed label
   std::array<bool, 256> is_stiff_{}, is_removed_{};
 };
 

@@ -25,13 +25,13 @@ struct ThinningOptions {
 
 struct Thinned {
   LabelVolume volume;
-  // [label]: the label given to the struts of `label`, unused before; 0 if `label` has no struts. The
-  // material of the struts must be n² times as stiff as that of `label`, n = `every`: a strut replaces a
-  // column of n × n voxels. Then n links of a strut in series equal one link of a lattice with n times the
+  // [label] Label of the struts of `label`, which was unused before; 0 if `label` has no struts. A strut
+  // replaces a column of n × n voxels, n = `every`. So the material of the struts must be n² times as stiff
+  // as that of `label`. Then n links of a strut in series equal one link of a lattice with n times the
   // spacing, both in stiffness (n²·E·h / n = E·n·h) and in limits. Links of a strut have full weight, as
   // those of any row of voxels (voxel/lattice/link_stiffness.h).
   std::array<std::uint8_t, 256> strut_label{};
-  std::size_t stiff = 0;    // voxels of the stiff labels before
+  std::size_t stiff = 0;    // voxels of the stiff labels before thinning
   std::size_t removed = 0;  // stiff voxels that are empty now
   std::size_t joined = 0;   // voxels kept only to preserve connectivity
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions on ITK's readers, and on exceptions of ITK and GDCM, which leave as a VolumeError with file,
-// action, cause and remedy. Only read_volume.cpp and read_dicom.cpp include this header.
+// Functions for ITK's readers, and for exceptions of ITK and GDCM. These exceptions become a VolumeError with
+// file, action, cause and remedy. Only read_volume.cpp and read_dicom.cpp include this header.
 #pragma once
 
 #include <exception>

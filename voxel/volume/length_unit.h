@@ -7,11 +7,12 @@
 
 namespace voxel {
 
-// The unit in meters: any metric prefix from kilo to nano, short or in full, in American or British spelling,
-// and the inch and the foot. Case, quotes and blanks do not matter. None if the word is no length.
+// The unit in meters. Known are the meter with the prefixes kilo, deci, centi, milli, micro and nano (short
+// or in full, in American or British spelling), the micron, the inch and the foot. Case, quotes and blanks do
+// not matter. Empty if the word is no such unit.
 std::optional<double> length_unit_m(const std::string& word);
 
-// "mm", or "0.0254 m" for a unit without a metric name.
+// The unit as text, such as "mm". A unit without a metric name gives "0.0254 m".
 std::string unit_in_words(double unit_m);
 
 }  // namespace voxel

@@ -8,9 +8,9 @@
 
 namespace voxel {
 
-// The number at the start of a text, after blanks, with a point whatever the locale; `end` is behind it. As
-// std::strtod() in the C locale: without a number `end` is `at`, and beyond the range of a double the number
-// is infinite.
+// Reads the number at the start of a text, after blanks. The decimal mark is a point in every locale. Sets
+// `end` behind the number, or to `at` if there is none. A number outside the range of a double gives
+// +infinity, even if it is negative or too small.
 inline double number_at(const char* at, const char** end) {
   const char* first = at;
   while (*first == ' ' || (*first >= '\t' && *first <= '\r')) ++first;

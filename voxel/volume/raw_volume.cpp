@@ -113,14 +113,14 @@ void check_frame(const std::filesystem::path& path, const FileFrame& frame) {
       worst = std::isfinite(error) ? std::max(worst, error) : std::numeric_limits<double>::infinity();
     }
   }
-  // Gantry tilt gives tens of percent, rounding in a header at most 1e-4.
+  // A tilted gantry gives errors of tens of percent, rounding in a header at most 1e-4.
   if (worst > 1e-3) {
     refuse_volume(path, "the axes are not at right angles (off by ", worst,
                   "), as with a tilted gantry; resample the volume onto a rectangular lattice first");
   }
 }
 
-// Nearest source voxel of the centre of each result voxel, along one axis.
+// Resampling along one axis: the source voxel nearest to the centre of each result voxel.
 struct Axis {
   std::vector<std::size_t> source;
   double first_centre = 0.0;  // (unit: source spacing) from source voxel 0
@@ -311,7 +311,7 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
       return;
     }
     const auto label_of = [&](T value, std::size_t index, std::size_t slice) {
-      // In double, the comparison with 255 means the same for every type. NaN fails it.
+      // The comparison is made in double, so that it means the same for every type. NaN fails it.
       const auto number = static_cast<double>(value);
       if (number >= 0.0 && number <= 255.0 && number == std::floor(number))
         return static_cast<std::uint8_t>(number);
@@ -338,7 +338,7 @@ VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next) {
       const std::span<const std::byte> bytes = next();
       for (std::size_t n = 0; n < bytes.size() / sizeof(T); ++n) {
         const auto value = static_cast<double>(value_at<T>(bytes, n));
-        if (value < low) low = value;  // NaN is in no range
+        if (value < low) low = value;  // false for NaN, which is in no range
         if (value > high) high = value;
         if (labels && value >= 0.0 && value <= 255.0 && value == std::floor(value)) {
           ++counts[static_cast<std::size_t>(value)];

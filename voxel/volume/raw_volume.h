@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A volume in its file's component type, between reading and labelling. Internal to the readers
-// (read_volume.h); independent of ITK and of file formats. Checks frames, memory and options; labels and
-// resamples the voxels.
+// (read_volume.h); independent of ITK and of file formats. The functions check frames, memory and options.
+// They label and resample the voxels.
 #pragma once
 
 #include <cstddef>
@@ -45,8 +45,8 @@ struct VolumeData {
 };
 
 // Returns the next slice of voxels: components in the file's order, x fastest, valid until the next call.
-// Reading by slices keeps the whole volume out of memory in its file's type, which may be eight times the
-// size of its labels.
+// Slices avoid holding the whole volume in the file's type, which may take eight times the memory of the
+// labels.
 using NextSlice = std::function<std::span<const std::byte>()>;
 
 // Throws VolumeError; its text is the file, then the parts, concatenated.
@@ -67,7 +67,8 @@ struct FileFrame {
   glm::dmat3 direction{1.0};  // columns are the axes of the lattice
 };
 
-// Gives the axes from `given` (0 to 3) on, which have one voxel, directions at right angles to the others.
+// Completes a frame whose file gives only the first `given` axes (0 to 3). The missing axes have one voxel.
+// They get directions at right angles to the others.
 void complete_axes(FileFrame& frame, std::size_t given);
 
 // Checks the frame and fills the header's dims, spacing, origin, rotation, component and bytes. Throws
@@ -86,8 +87,8 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
 
 VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next);
 
-// slope · voxel + intercept of each voxel, computed in double, as numbers of type `to`; those beyond its
-// range become its ends. `out` has as many voxels as `voxels`.
+// Computes slope · voxel + intercept for each voxel in double and stores it as type `to`. Whole-number types
+// are clamped to their range. `out` has as many voxels as `voxels`.
 void rescale_voxels(Component from, std::span<const std::byte> voxels, double slope, double intercept,
                     Component to, std::span<std::byte> out);
 

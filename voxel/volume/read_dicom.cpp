@@ -30,7 +30,7 @@ std::string name_of(const DicomSlice& slice) {
   return slice.file.frames == 1 ? name : name + ", frame " + std::to_string(slice.index + 1);
 }
 
-// The state of one file as a child process returns it. Trivially copyable, because it lies in shared memory.
+// The state of one file, as a child process returns it. Trivially copyable, because it lies in shared memory.
 struct SharedFile {
   bool done = false;
   std::array<char, 1000> refusal{};
@@ -73,7 +73,7 @@ void for_each_apart(const fs::path& folder, const std::vector<fs::path>& files, 
   }
 }
 
-// The regular files of a folder, by name.
+// The regular files of a folder, sorted by name.
 std::vector<fs::path> files_of(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -86,7 +86,8 @@ std::vector<fs::path> files_of(const fs::path& folder) {
   return files;
 }
 
-// A file that is no DICOM image is left out, unless it stands in the place of a slice.
+// Throws VolumeError if a file stands in the place of a slice (foreign_file.h). Other files that are no DICOM
+// images are left out.
 void check_left_out(const std::vector<fs::path>& others, const std::vector<fs::path>& images) {
   for (const fs::path& file : others) {
     if (images.empty() || file.extension() == images[0].extension()) refuse_foreign_file(file, false);
@@ -98,7 +99,7 @@ void check_left_out(const std::vector<fs::path>& others, const std::vector<fs::p
 std::vector<DicomSlice> read_slices(const fs::path& folder, VolumeHeader& header) {
   std::vector<fs::path> images, others;
   std::vector<DicomFile> kinds;
-  std::vector<std::size_t> first;  // frame of each file, in the list of all frames
+  std::vector<std::size_t> first;  // index of each file's first frame in the list of all frames
   std::size_t frames = 0;
   for (const fs::path& file : files_of(folder)) {
     const DicomFile kind = check_dicom(file);
@@ -147,7 +148,7 @@ std::vector<DicomSlice> read_slices(const fs::path& folder, VolumeHeader& header
   return slices;
 }
 
-// What a single slice may leave out, several may not: their order and distance follow from their places.
+// Several slices must state their positions, which give their order and distance. A single slice need not.
 void check_places(const fs::path& folder, const std::vector<DicomSlice>& slices, VolumeHeader& header) {
   bool spacing = true, orientation = true;
   for (const DicomSlice& slice : slices) {
@@ -224,8 +225,8 @@ double slice_step(const fs::path& folder, const std::vector<DicomSlice>& slices)
   return (slices.back().height - slices.front().height) / (static_cast<double>(slices.size()) - 1.0);
 }
 
-// The smallest type that holds the rescaled numbers of all slices: that of the stored ones where no slice is
-// rescaled, else whole numbers where slope and intercept are whole, else double.
+// The smallest type that holds the rescaled numbers of all slices. It is the stored type if no slice is
+// rescaled, and a whole-number type if all slopes and intercepts are whole. Otherwise it is double.
 Component common_component(const std::vector<DicomSlice>& slices) {
   const Component stored = slices.front().frame.stored;
   bool as_stored = true, whole = true;
@@ -253,7 +254,7 @@ Component common_component(const std::vector<DicomSlice>& slices) {
   return Component::float64;
 }
 
-// The thickness of a single slice, which is the size of its voxels (unit: the file's).
+// The thickness of a single slice: the size of its voxels along the normal (unit: the file's).
 double single_thickness(const DicomSlice& slice, std::vector<std::string>& notes) {
   const double thickness = slice.frame.plane.spacing.z;
   std::ostringstream note;
@@ -295,7 +296,7 @@ std::unique_ptr<SharedMemory> read_dicom_voxels(const fs::path& folder, const Di
   const VolumeData& data = series.data;
   const std::size_t slice_bytes = data.slice_bytes();
   const std::size_t voxels = slice_bytes / size_of(data.component);
-  std::map<fs::path, std::vector<std::size_t>> slices_of;  // a file is read once, whatever it holds
+  std::map<fs::path, std::vector<std::size_t>> slices_of;  // each file is read once
   for (std::size_t k = 0; k < series.slices.size(); ++k) slices_of[series.slices[k].path].push_back(k);
   std::vector<fs::path> files;
   for (const auto& [file, slices] : slices_of) files.push_back(file);

@@ -17,7 +17,7 @@ struct DicomSlice {
   DicomFile file;
   std::size_t index = 0;  // of the frame in its file
   DicomFrame frame;
-  double height = 0.0;  // (unit: the file's) along the slice normal
+  double height = 0.0;  // position along the slice normal (unit: the file's)
 };
 
 struct DicomSeries {

@@ -54,7 +54,7 @@ FileFrame frame_of(const fs::path& path, const itk::ImageIOBase& io) {
 
 struct OpenVolume {
   VolumeFormat format = VolumeFormat::nifti;
-  itk::ImageIOBase::Pointer io;  // MetaImage: reads the header
+  itk::ImageIOBase::Pointer io;  // for MetaImage it reads the header, too
   VolumeData data;
   VoxelPlace place;
 };
@@ -118,8 +118,8 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// Calls use(data, next slice) for a single file. Raw and deflated voxels are streamed. Others (text, and
-// those whose place a library must find) are read whole into memory by the library.
+// Calls use(data, next slice) for a single file. Raw and deflated voxels are streamed. The format's library
+// reads other voxels whole into memory: text, and voxels whose place only the library can find.
 template <typename Use>
 auto with_file_slices(const fs::path& path, const std::optional<double>& unit_m,
                       const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes, Use use) {
@@ -142,7 +142,7 @@ auto with_file_slices(const fs::path& path, const std::optional<double>& unit_m,
     stream.finish();
     return result;
   }
-  // NRRD's library reads into its own buffer first.
+  // The NRRD library reads into its own buffer first.
   check_memory(path, data, open.format == VolumeFormat::nrrd ? 2.0 : 1.0, spacing_m, max_bytes);
   if (packed) {  // check completeness: the libraries replace missing voxels by zeros
     VoxelStream whole(path, open.place, data.header);

@@ -40,7 +40,8 @@ struct VolumeHeader {
   std::vector<std::string> notes;  // e.g. axes flipped to make the frame right-handed
 };
 
-// A range of intensities (or one label) that becomes one label. First match wins; no match is empty (0).
+// A range of intensities (or one label) that becomes one label. The first rule that matches a voxel wins. A
+// voxel that matches no rule is empty (0).
 struct LabelRule {
   double lower = 0.0, upper = 0.0;  // inclusive, in the file's own intensity
   std::uint8_t label = 1;           // 1..255
@@ -68,13 +69,13 @@ VolumeHeader read_volume_header(const std::filesystem::path& path,
 LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptions& options,
                         std::vector<std::string>* notes = nullptr);
 
-// Labels with their voxel counts, and the range of intensities, for the command `check`. The reader throws
-// VolumeError.
+// Labels with their voxel counts, and the range of intensities, for the command `check`.
 struct VolumeStatistics {
   double minimum = 0.0, maximum = 0.0;
   // Empty unless every value is a whole number in 0..255. In rising order; 0 (empty) is listed if present.
   std::vector<std::pair<int, std::size_t>> label_counts;
 };
+// Throws VolumeError.
 VolumeStatistics read_volume_statistics(const std::filesystem::path& path,
                                         std::uint64_t max_bytes = 8ULL << 30);
 

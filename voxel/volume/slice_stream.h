@@ -38,7 +38,7 @@ class VoxelStream {
 
   std::filesystem::path path_;
   VoxelPlace place_;
-  std::uint64_t needed_ = 0, read_ = 0;  // (unit: byte) of the voxels
+  std::uint64_t needed_ = 0, read_ = 0;  // bytes of all voxels; bytes read so far
   std::ifstream file_;
   std::unique_ptr<Inflater> inflater_;  // null if the voxels are raw
   std::vector<std::byte> slice_;

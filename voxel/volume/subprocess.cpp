@@ -40,7 +40,7 @@ int run_in_subprocess(const std::function<void()>& call, unsigned cpu_seconds) {
       dup2(nowhere, STDERR_FILENO);
     }
     call();
-    _exit(0);  // without the caller's destructors and buffers
+    _exit(0);  // runs no destructors and flushes no buffers of the caller
   }
   int status = 0;
   while (waitpid(child, &status, 0) < 0) {

@@ -49,8 +49,8 @@ double TextHeader::number(const std::string& key, double otherwise) const {
 }
 
 TextHeader read_text_header(const fs::path& path, char separator, const std::string& last_key) {
-  // MetaIO has a buffer of 1,024 characters and does not check. NRRD headers of 3D Slicer have lines of
-  // 2,000.
+  // MetaIO reads a line into a buffer of 1,024 characters without checking its length. 3D Slicer writes NRRD
+  // headers with lines of 2,000.
   const std::size_t longest_line = separator == '=' ? 1000 : 100'000;
   constexpr std::size_t kMostLines = 10'000;
   std::ifstream file(path, std::ios::binary);
@@ -105,7 +105,7 @@ void find_data_file(const fs::path& header, const std::string& name, VoxelPlace&
 
 void check_axes(const fs::path& path, double axes) {
   if (axes >= 1.0 && axes <= 7.0 && axes == std::floor(axes))
-    return;  // the reader checks later that it is one volume
+    return;  // the format's reader checks later that the file holds one volume
   refuse_volume(path, "the header says ", axes, " axes; a volume has three. ", kDamaged);
 }
 

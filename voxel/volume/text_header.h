@@ -17,7 +17,7 @@ bool ends_with(const std::string& text, const std::string& end);
 bool starts_with(const std::string& text, const std::string& start);
 std::string lower_case(std::string text);
 
-// The "key = value" or "key: value" lines; keys are in lower case without blanks.
+// The "key = value" or "key: value" lines of a header. Keys are in lower case without blanks.
 struct TextHeader {
   std::map<std::string, std::string> fields;
   std::uint64_t bytes = 0;  // length of the header in its file

@@ -31,7 +31,7 @@ struct SliceData {
   }
 };
 
-// Displacements of the corners of voxels between two slices, in spacings.
+// Displacements of the voxel corners that lie between two slices (unit: spacing).
 struct Corners {
   std::vector<glm::dvec3> moved;
   bool still = true;
@@ -43,8 +43,8 @@ class Boxes {
   Boxes(const VolumeFrame& frame, const LabelSlice& labels, const VectorSlice& displacement)
       : frame_(frame), labels_(labels), displacement_(displacement) {}
 
-  // Calls visit(i, j, k, label, corners, still). corners[c] is the place of corner c (bits: x, y, z; unit:
-  // index); valid only if not `still`.
+  // Calls visit(i, j, k, label, corners, still). corners[c] is the place of corner c (unit: index). Bits 0 to
+  // 2 of c select the side along x, y and z. `corners` is valid only if not `still`.
   template <typename Visit>
   void for_each(Visit visit) const {
     const auto nx = static_cast<std::size_t>(frame_.dims[0]), ny = static_cast<std::size_t>(frame_.dims[1]);
@@ -142,7 +142,8 @@ struct IndexBox {
   glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
 };
 
-// The empty lattice that covers the volume before and after. `shift` is the index of the old voxel (0,0,0).
+// The empty lattice that covers the volume before and after the warp. `shift` is the index of the old voxel
+// (0,0,0).
 LabelVolume enlarged(const VolumeFrame& frame, const IndexBox& range, glm::ivec3& shift,
                      std::size_t max_voxels) {
   LabelVolume volume;

@@ -29,8 +29,9 @@ constexpr const char* kRemedy = "check the folder's permissions and free space";
 
 enum class Packing { raw, gzip, zlib };
 
-// Writes a file completely or not at all: keep() puts it in the place of the path, or of what a link there
-// names. Until then it has no name, and is gone with the process, where the file system can do that.
+// Writes a file completely or not at all. keep() moves it to the path, or to the target if the path is a
+// symbolic link. Until then the file has no name if the file system allows that, so that it vanishes with the
+// process.
 class TemporaryFile {
  public:
   explicit TemporaryFile(fs::path path)
@@ -39,7 +40,7 @@ class TemporaryFile {
         part_(target_.string() + ".part" + std::to_string(getpid())) {
     std::error_code error;
     const fs::file_status status = fs::status(target_, error);
-    beside_ = !fs::exists(status) || fs::is_regular_file(status);  // a device has no other name
+    beside_ = !fs::exists(status) || fs::is_regular_file(status);  // a device is written directly
     // A rename would replace an empty folder by the file.
     if (!fs::is_directory(status)) open();
     if (!out_.is_open()) refuse_volume(path_, "the file cannot be written; ", kRemedy);
@@ -72,7 +73,7 @@ class TemporaryFile {
 
  private:
   static fs::path behind_links(fs::path path) {
-    constexpr int kMostLinks = 40;  // as for the system itself
+    constexpr int kMostLinks = 40;  // as in the operating system
     std::error_code error;
     for (int n = 0; n < kMostLinks && fs::is_symlink(fs::symlink_status(path, error)); ++n) {
       const fs::path to = fs::read_symlink(path, error);
@@ -99,7 +100,7 @@ class TemporaryFile {
     if (::fsync(descriptor_) != 0) return false;
     std::error_code error;
     if (unnamed_) {
-      fs::remove(part_, error);  // of a process that had this number and was killed
+      fs::remove(part_, error);  // left by a killed process that had the same number
       if (::linkat(AT_FDCWD, open_file().c_str(), AT_FDCWD, part_.c_str(), AT_SYMLINK_FOLLOW) != 0)
         return false;
     }
@@ -212,7 +213,7 @@ Saved check_path(const fs::path& path, const VolumeFrame& frame, bool vectors, d
 
 // ---- headers
 
-// NIfTI's number of a length unit; 0 if it has none.
+// NIfTI's code for a length unit; 0 if NIfTI has none.
 char nifti_unit(double unit_m) {
   const std::string unit = unit_in_words(unit_m);
   return static_cast<char>(unit == "m" ? 1 : unit == "mm" ? 2 : unit == "um" ? 3 : 0);
