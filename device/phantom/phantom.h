@@ -37,13 +37,14 @@ class PhantomDevice : public HapticDevice, public ServoDriver {
 };
 
 // Opens a device. Throws DeviceError with the remedy.
-//   limits() has the force that the driver reports, and commonly quoted figures for stiffness, resolution and
-//            friction of the model; 0 for an unknown model;
-//   read()   outside of serve() schedules a read on the driver's thread and waits for that thread's next
-//   tick; write()  outside of serve() does nothing: the motors are off; serve()  refuses a device that is not
-//   calibrated (DeviceError). The force is zero in the tick of a driver
-//            error, a late tick, a position that is not finite, a lost calibration or an open safety switch.
-//            If the driver reports an error only after a tick, the force is zero in the next tick.
+//   - limits() has the force that the driver reports. Stiffness, resolution and friction are commonly quoted
+//     figures of the model; 0 for an unknown model.
+//   - read() outside of serve() schedules a read on the driver's thread and waits for that thread's next
+//     tick.
+//   - write() outside of serve() does nothing: the motors are off.
+//   - serve() refuses a device that is not calibrated (DeviceError). The force is zero in the tick of a
+//     driver error, a late tick, a position that is not finite, a lost calibration or an open safety switch.
+//     If the driver reports an error only after a tick, the force is zero in the next tick.
 std::unique_ptr<PhantomDevice> open_phantom(const PhantomOptions& options = {});
 
 }  // namespace device

@@ -236,7 +236,7 @@ std::unique_ptr<HapticDevice> make_simulated_device(DeviceModel model, const Han
   return std::make_unique<IdealDevice>(std::move(path));
 }
 
-// device/DECISIONS.md ("Simulated: figures of the devices") gives the source of each value.
+// device/DECISIONS.md ("simulated: figures of the devices") gives the source of each value.
 const Mechanism& mechanism(DeviceModel model) noexcept {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   // No maker states it. The value is small compared with a hand's 4 to 7 N·s/m.

@@ -31,12 +31,10 @@ struct ToolIntegrator::AppliedForces {
 
   [[nodiscard]] glm::dvec3 target(double at_s) const noexcept { return target_m + at_s * target_m_per_s; }
 
-  // The motion after flow.time_s, which begins at_s after the start of the step, under a constant
-  // `friction_N`.
+  // The motion after flow.time_s under a constant `friction_N`. It begins at_s after the start of the step.
   [[nodiscard]] ToolMotion after(const LinearFlow& flow, const ToolMotion& motion, double at_s,
                                  const glm::dvec3& friction_N) const noexcept {
-    // The flow is computed relative to the target. The mechanism's viscous friction is relative to the
-    // ground.
+    // The flow is relative to the target. The mechanism's viscous friction is relative to the ground.
     const glm::dvec3 speed = motion.velocity_m_per_s - target_m_per_s;
     const glm::dvec3 pull = (motor_N + friction_N - viscous_N_s_per_m * target_m_per_s +
                              stiffness_N_per_m * (target(at_s) - motion.position_m)) /
