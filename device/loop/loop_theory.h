@@ -24,8 +24,8 @@ struct SampledLoop {
 // (matrix exponential). Forces that wait for the motors are part of the state.
 [[nodiscard]] double spectral_radius(const SampledLoop& loop, double stiffness_N_per_m);
 
-// The smallest K at which the loop becomes unstable (N/m), to a relative 1e-9. It is 0 if the loop is
-// unstable with almost no wall (1e-6·m/T²); a B that is too large for m and T causes that.
+// The smallest K at which the loop becomes unstable (N/m), to a relative 1e-9. Returns 0 if the loop is
+// unstable even for K = 1e-6·m/T². The cause is then a B that is too large for m and T.
 [[nodiscard]] double largest_stable_stiffness(const SampledLoop& loop);
 
 // ---- passivity

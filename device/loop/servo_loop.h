@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One servo loop for all devices. A simulated device is ticked by the calling thread, at full speed or paced
-// by a timer. A real device is ticked by its driver's servo thread.
+// One servo loop for all devices. The ticks of a simulated device run on the calling thread, at full speed or
+// paced by a timer. Those of a real device run on its driver's servo thread.
 #pragma once
 
 #include <cstdint>
@@ -81,8 +81,8 @@ class ServoDriver {
   virtual ServoReport serve(ServoFunction tick, const ServoOptions& options) = 0;
 };
 
-// Reads, ticks and writes until the function or a signal ends it. The last force written is zero, also if the
-// function throws.
+// Serves the device until `tick` or a signal ends the loop: reads, calls `tick`, writes. The last force that
+// is written is zero, also if `tick` throws.
 ServoReport run_servo(HapticDevice& device, const ServoOptions& options, ServoFunction tick);
 
 }  // namespace device

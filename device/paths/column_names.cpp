@@ -203,7 +203,7 @@ std::string without_brackets(std::string_view text, StatedUnit& stated, std::vec
   return rest.append(text);
 }
 
-// Cuts off a unit behind '/', as in "x/mm" and "v/m/s".
+// Removes a unit after '/', as in "x/mm" and "v/m/s".
 void cut_slash(std::string& text, StatedUnit& stated) {
   for (std::size_t slash = text.find('/'); slash != std::string::npos; slash = text.find('/', slash + 1)) {
     const std::string_view behind = without_blanks(std::string_view(text).substr(slash + 1));

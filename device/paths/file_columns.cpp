@@ -143,7 +143,7 @@ class NamedColumns {
   }
 
   void choose_time() {
-    std::vector<std::size_t> best;  // of the lowest rank
+    std::vector<std::size_t> best;  // columns of the lowest rank
     for (std::size_t i = 0; i < read_.size(); ++i) {
       if (read_[i].quantity != Quantity::time) continue;
       if (!best.empty() && read_[i].rank > read_[best[0]].rank) continue;

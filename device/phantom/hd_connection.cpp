@@ -20,7 +20,7 @@ constexpr const char* kOpenHints =
     "(groups dialout, plugdev); delete a stale configuration in the home folder, or name the right one by "
     "GTDD_HOME";
 
-// The driver's default device is opened without a name or, in some editions, by one of these.
+// The driver's default device is opened without a name or, in some editions, under one of these names.
 constexpr std::array<const char*, 3> kDefaultNames{nullptr, "Default Device", "Default PHANToM"};
 
 std::string quoted(const char* name) {

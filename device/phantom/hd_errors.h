@@ -13,7 +13,7 @@ namespace device {
 
 enum class HdOutcome : std::uint8_t {
   none,   // no error
-  rest,   // zero force, then back by a ramp
+  rest,   // zero force for a while, then a ramp
   ended,  // the device is lost for this session
 };
 

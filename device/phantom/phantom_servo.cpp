@@ -18,7 +18,7 @@ namespace device {
 namespace {
 
 constexpr std::uint64_t kTemperatureEvery = 64;  // ticks between readings
-constexpr double kWarm = 0.8;  // fraction of the permitted temperature that is worth a message
+constexpr double kWarm = 0.8;  // share of the permitted temperature above which a message is given
 
 long thread_number() noexcept {
   return syscall(SYS_gettid);
@@ -222,7 +222,7 @@ void PhantomServo::on_crash(void* servo) noexcept {
     self.call_.end_frame(self.handle_);
     return;
   }
-  // The next tick sends zero force; wait a few ticks for it.
+  // The next tick of the servo thread sends zero force. This thread waits up to 10 ms for it.
   for (int i = 0; i < 20 && !self.crash_zeroed_.load() && !self.done(); ++i) {
     constexpr timespec kHalfMillisecond{0, 500'000};
     nanosleep(&kHalfMillisecond, nullptr);

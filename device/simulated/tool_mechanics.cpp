@@ -60,7 +60,7 @@ const LinearFlow& ToolIntegrator::flow(double time_s) noexcept {
   return slot;
 }
 
-// One substep in which the tool moves or begins to.
+// One substep in which the tool moves or begins to move.
 double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, double at_s,
                             const LinearFlow& step) const noexcept {
   const double most_N = mechanics_.coulomb_N, step_s = step.time_s;
@@ -118,7 +118,7 @@ void ToolIntegrator::advance_with_friction(ToolMotion& motion, const AppliedForc
   const double step_s = dt_s / std::clamp(std::ceil(dt_s / max_substep_s_ - 1e-6), 1.0, kMaxSubsteps);
   const double nothing_s = 1e-9 * step_s;
   double at_s = 0.0;
-  // Terminates: after a stop within a substep the tool sticks, or slips for a whole substep.
+  // The loop terminates: after a stop within a substep the tool sticks, or slips for a whole substep.
   while (dt_s - at_s > nothing_s) {
     if (motion.velocity_m_per_s == kRest) {
       const double stiffness = mechanics_.hand_stiffness_N_per_m;
