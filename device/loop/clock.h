@@ -5,8 +5,8 @@
 namespace device {
 
 // Compensated summation (Knuth, The Art of Computer Programming, vol. 2, 4.2.2): the rounding error of each
-// addition is carried into the next. So after n steps the time is n·dt, rounded once, for any n. A plain sum
-// would drift by microseconds within hours.
+// addition is carried into the next one. So for any n the time after n steps is n·dt, rounded once. A plain
+// sum would drift by microseconds within hours.
 class Clock {
  public:
   Clock() = default;

@@ -11,8 +11,8 @@ struct ForceGateOptions {
   double ramp_s = 0.5;   // from zero to the whole force
 };
 
-// The force is multiplied by pass(). It is 0 from the tick in which close() was called, and 1 again after
-// rest and ramp. A new gate starts with the ramp. Never throws, never allocates.
+// The caller multiplies the force by pass(). The factor is 0 from the tick in which close() was called, and 1
+// again after rest and ramp. A new gate starts with the ramp. Never throws, never allocates.
 class ForceGate {
  public:
   explicit ForceGate(const ForceGateOptions& options = {}) : options_(options) {}

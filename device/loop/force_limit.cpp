@@ -10,14 +10,14 @@
 namespace device {
 namespace {
 
-// A limit that is NaN or negative lets nothing through.
+// A limit that is NaN or negative counts as 0.
 double usable_limit(double limit) noexcept {
   return limit > 0.0 ? limit : 0.0;
 }
 
-// `v` shortened to `limit`; `cut` tells whether it was longer. The vector is divided by its largest component
-// first, so that no square overflows or vanishes. A cut vector is shortened by 5 ulp more, so that rounding
-// cannot put it above the limit.
+// Returns `v`, shortened to the length `limit` if it is longer; `cut` says whether it was. The vector is
+// divided by its largest component first, so that no square overflows or vanishes. A cut vector is shortened
+// by 5 ulp more, so that rounding cannot put its length above the limit.
 glm::dvec3 no_longer_than(const glm::dvec3& v, double limit, bool& cut) noexcept {
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   cut = false;
@@ -29,7 +29,7 @@ glm::dvec3 no_longer_than(const glm::dvec3& v, double limit, bool& cut) noexcept
   return scaled * (limit / scaled_length * (1.0 - 1e-15));
 }
 
-// Adds the work of the last force on the tool since the last tick.
+// Adds the work that the last force did on the tool since the last tick.
 void count_work(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& position_m,
                 double dt_s) noexcept {
   if (!is_finite(position_m)) return;
@@ -39,7 +39,7 @@ void count_work(const ForceLimits& limits, ForceLimitState& state, const glm::dv
   state.placed = true;
 }
 
-// Zero force, counted by its reason.
+// Returns zero force, and counts its reason.
 glm::dvec3 cut_force(ForceLimitState& state, std::uint64_t& counter) noexcept {
   ++counter;
   state.last_N = glm::dvec3(0.0);
@@ -71,13 +71,13 @@ glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const 
   const double dt = std::isfinite(dt_s) && dt_s > 0.0 ? dt_s : 0.0;
   count_work(limits, state, tool.position_m, dt);
   const double fade = limits.soft_start_s > 0.0 ? std::min(1.0, state.elapsed_s / limits.soft_start_s) : 1.0;
-  // Saturated, because only values below the soft start matter.
+  // Bounded, because only values below soft_start_s matter.
   state.elapsed_s = std::min(state.elapsed_s + dt, std::max(0.0, limits.soft_start_s));
 
-  // Checked first, because a value that is not finite must not reach the slew rate's memory. The force is
-  // zero at once, and the slew rate starts from zero again.
+  // The finite check comes first, because a value that is not finite must not be stored in last_N. The force
+  // is zero at once, and the slew rate starts from zero again.
   if (!is_finite(command_N)) return cut_force(state, state.nonfinite);
-  // Written so that a limit that is NaN lets nothing through.
+  // The comparisons are written so that a limit that is NaN cuts the force.
   std::uint64_t* reason = nullptr;
   if (tool.fault == DeviceFault::late || !(dt <= limits.deadline_s)) {
     reason = &state.late;
@@ -102,7 +102,7 @@ glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const 
   force = no_longer_than(force, usable_limit(limits.max_force_N), cut);
   if (cut) ++state.clamped;
 
-  if (!is_finite(force)) force = glm::dvec3(0.0);  // the difference of two finite commands can overflow
+  if (!is_finite(force)) force = glm::dvec3(0.0);  // the difference of two finite forces can overflow
   state.last_N = force;
   return force;
 }

@@ -9,14 +9,14 @@
 
 namespace device {
 
-// State of the device at a read. If several hold, the first in this order is reported.
+// Fault of the device at a read. Of several faults, the first in this order is reported.
 enum class DeviceFault : std::uint8_t {
   none,
   lost,            // no answer: unplugged, switched off, communication error
   not_calibrated,  // positions are not valid yet
-  warm_motors,     // the driver has cut the motors, or will, until they are cooler
+  warm_motors,     // the driver has switched the motors off, or will, until they are cooler
   force_limit,     // the driver refused a force as too large
-  velocity_limit,  // the driver cut the motors because the tool moves too fast
+  velocity_limit,  // the driver switched the motors off because the tool moves too fast
   late,            // set by the loop: the last force was held longer than allowed
 };
 
@@ -37,8 +37,8 @@ struct DeviceLimits {
   double max_stiffness_N_per_m = 0.0;  // nominal
   double resolution_m = 0.0;           // encoder step; 0 for an ideal device
   double friction_N = 0.0;             // Coulomb friction of the mechanism
-  // Size of the box that the tool can reach: x right, y up, z towards the person. Used to fit scenes; a
-  // simulated device is not confined to it.
+  // Size of the box that the tool can reach: x right, y up, z towards the person (m). Scenes are fitted to
+  // it. A simulated device may leave it.
   glm::dvec3 workspace_m{std::numeric_limits<double>::infinity()};
 };
 
@@ -56,8 +56,9 @@ class HapticDevice {
   // The force on the hand (N, scene frame), held until the next write. A simulated device also advances by
   // dt_s.
   virtual void write(const glm::dvec3& force_N, double dt_s) noexcept = 0;
-  // The next tick came late, and the force of the last write stayed for another extra_s. A simulated device
-  // advances by that time, and its watchdog counts on from the last write. A real device needs no call.
+  // Call it if the next tick comes late, so that the force of the last write stays for another extra_s. A
+  // simulated device advances by that time; its watchdog keeps counting from the last write. A real device
+  // needs no call.
   virtual void delay(double /*extra_s*/) noexcept {}
   [[nodiscard]] virtual DeviceLimits limits() const noexcept = 0;
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;

@@ -6,8 +6,8 @@
 namespace device {
 namespace {
 
-// Taylor series of g about 0, with p = d/m and q = k/m. For short times the closed forms would be differences
-// of nearly equal numbers.
+// Taylor series of g about 0, with p = d/m and q = k/m. It is used for short times, where the closed forms
+// are differences of nearly equal numbers.
 LinearFlow short_flow(double p, double q, double t) noexcept {
   constexpr int kTerms = 24;      // terms of at most (1/2)^n / n!: far below rounding
   double before = 0.0, term = t;  // t^n times the coefficient of g, for n = 0 and 1
@@ -52,8 +52,8 @@ LinearFlow linear_flow(double mass_kg, double damping_N_s_per_m, double stiffnes
   LinearFlow flow{.time_s = t};
   const double alpha = 0.5 * p;
   const double split = alpha * alpha - q;  // above 0 overdamped, below 0 oscillating
-  // Near critical damping the two roots nearly coincide. With hardly any spring the damping is not near
-  // critical, and only the time is short.
+  // Near critical damping the two roots nearly coincide. The second condition excludes a very weak spring:
+  // there the damping is not near critical, and `split`·t² is small only because the time is short.
   if (std::abs(split) * t * t <= 1.0 && q * t * t > 0.01) {
     double sinh_by_x = 1.0, cosh = 1.0;
     hyperbolic(split * t * t, sinh_by_x, cosh);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Exact motion of mass, spring and damper over a given time.
+// Exact motion of a mass on a spring and a damper over a given time.
 #pragma once
 
 namespace device {
@@ -9,7 +9,7 @@ namespace device {
 //   y'(t) = velocity_factor · y'(0) + from_velocity_s · a,
 // with a = (F − k·y(0)) / m. The coefficients follow from the impulse response g:
 //   g'' + (d/m)·g' + (k/m)·g = 0, g(0) = 0, g'(0) = 1.
-// They give the change of y instead of y itself, so that a small change keeps its digits.
+// The formulas give the change of y instead of y itself, so that a small change keeps its digits.
 struct LinearFlow {
   double time_s = -1.0;
   double from_velocity_s = 0.0;       // g
@@ -17,7 +17,7 @@ struct LinearFlow {
   double from_acceleration_s2 = 0.0;  // ∫ g
 };
 
-// For mass > 0, damping >= 0, stiffness >= 0 and a finite time >= 0. The relative error is below 1e-12 for
+// Needs mass > 0, damping >= 0, stiffness >= 0 and a finite time >= 0. The relative error is below 1e-12 for
 // values of any size (tests/device/loop/test_linear_flow.cpp).
 LinearFlow linear_flow(double mass_kg, double damping_N_s_per_m, double stiffness_N_per_m,
                        double time_s) noexcept;

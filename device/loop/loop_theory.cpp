@@ -11,7 +11,7 @@
 namespace device {
 namespace {
 
-// Exact map of position and velocity over one period, under a force that is held (zero-order hold).
+// Exact map of position and velocity over one period, under a constant force (zero-order hold).
 struct SampledMechanics {
   Eigen::Matrix2d state;
   Eigen::Vector2d force;
@@ -41,7 +41,7 @@ double radius_of(const SampledLoop& loop, const SampledMechanics& mechanics, dou
   if (delay == 0) {
     map.topRows<2>() += mechanics.force * law;
   } else {
-    map.block<2, 1>(0, size - 1) = mechanics.force;  // the oldest force is the one applied
+    map.block<2, 1>(0, size - 1) = mechanics.force;  // the motors apply the oldest force
     map.row(3) = law;
     for (Eigen::Index n = 4; n < size; ++n) map(n, n - 1) = 1.0;
   }
@@ -55,14 +55,14 @@ double spectral_radius(const SampledLoop& loop, double stiffness_N_per_m) {
 }
 
 double largest_stable_stiffness(const SampledLoop& loop) {
-  constexpr double kStep = 1.05;  // of the search: the smallest boundary is wanted
+  constexpr double kStep = 1.05;  // factor of the search upwards, small enough to find the first boundary
   const SampledMechanics mechanics = sample_mechanics(loop);
   const double unit = loop.mass_kg / (loop.period_s * loop.period_s);
   double stable = 1e-6 * unit;
   if (!(radius_of(loop, mechanics, stable) < 1.0)) return 0.0;
   double unstable = stable * kStep;
-  // The boundary is at most near m/T² if the mass dominates. If damping dominates it is near 2b/T, which m/T²
-  // does not bound.
+  // If the mass dominates, the boundary is of the order of m/T² or below. If damping dominates, it is near
+  // 2b/T, which may be far above m/T².
   while (radius_of(loop, mechanics, unstable) < 1.0 && unstable < 1e6 * unit) {
     stable = unstable;
     unstable *= kStep;
@@ -75,8 +75,8 @@ double largest_stable_stiffness(const SampledLoop& loop) {
 }
 
 double passive_damping_at(const SampledLoop& loop, double stiffness_N_per_m, double theta_rad) {
-  // Re{(1 − z⁻¹)·z^(−d)} = cos dθ − cos (d+1)θ, and the same once more for the difference in B. Divided by 1
-  // − cos θ and written as products of sines, which keep their digits at small θ.
+  // Re{(1 − z⁻¹)·z^(−d)} = cos dθ − cos (d+1)θ; for B the factor 1 − z⁻¹ comes twice. Both are divided by
+  // 1 − cos θ, and written as products of sines and cosines, which keep their digits at small θ.
   const double half = std::sin(0.5 * theta_rad), d = std::max(loop.delay_ticks, 0);
   const double spring = std::sin((d + 0.5) * theta_rad) / half;
   const double damper = -2.0 * std::cos((d + 1.0) * theta_rad);
@@ -84,7 +84,7 @@ double passive_damping_at(const SampledLoop& loop, double stiffness_N_per_m, dou
 }
 
 double passive_damping(const SampledLoop& loop, double stiffness_N_per_m) {
-  // A polynomial of degree delay + 1 in cos θ: resolves its maximum to 1e-6.
+  // The expression is a polynomial of degree delay + 1 in cos θ. So many angles give its maximum to 1e-6.
   constexpr int kAngles = 4096;
   double most = 0.0;
   for (int n = 1; n <= kAngles; ++n) {

@@ -10,26 +10,26 @@
 namespace device {
 namespace {
 
-// Energy allowed beyond the worst tick, too small to be measured. Without it a tool whose debt equals the
-// worst tick could not work its way out.
+// Energy that may be given beyond worst_tick_J, too small to be measured. Without it the force would stay
+// zero once given_J equals worst_tick_J, and no work against it could lower given_J again.
 constexpr double kSpare_J = 1e-9;
-// Energy that a force may give before any was stored, if it throws back a tool at rest. Enough for every wall
-// up to 2.5 kN/m at 1 kHz to start unreduced.
+// Energy that a force may give to a tool at rest before any energy is stored. It is enough for walls of up to
+// 2.5 kN/m at 1 kHz to start with their whole force.
 constexpr double kSeed_J = 200e-6;
-constexpr double kStrideKept_s = 0.5;
+constexpr double kStrideKept_s = 0.5;  // time constant with which stride_m falls
 
-// Longest step of a tool at rest until the next tick. It is a divisor, so never 0.
+// Longest step that a tool at rest can make until the next tick (m). Never 0, because it is a divisor.
 double sudden_m(const PassivityOptions& options, double dt_s) noexcept {
   constexpr double kLeast_m = 1e-9;
   return std::max(kLeast_m, options.max_acceleration_m_per_s2 * dt_s * dt_s + options.resolution_m);
 }
 
-// The same for a tool that moves as it did recently, in either direction.
+// The same for a tool that may move as fast as it did recently, in either direction.
 double reach_m(const PassivityOptions& options, const PassivityState& state, double dt_s) noexcept {
   return 2.0 * state.stride_m + sudden_m(options, dt_s);
 }
 
-// Accounts for the work of the last force over `way`.
+// Adds the work of the last force over the tool's step `way` (m).
 void observe(const PassivityOptions& options, PassivityState& state, const glm::dvec3& way,
              double dt_s) noexcept {
   const double length = glm::length(way);
@@ -38,7 +38,8 @@ void observe(const PassivityOptions& options, PassivityState& state, const glm::
   const double work = glm::dot(state.last_N, way);
   state.given_J += work;
   state.worst_tick_J = std::max(state.worst_tick_J, std::abs(work));
-  // After a step that the bound excludes, the excess is written off; otherwise the force would never recover.
+  // A step longer than reach_m() may exceed the guarantee. The excess is then added to worst_tick_J; else the
+  // force would never recover.
   state.worst_tick_J = std::max(state.worst_tick_J, state.given_J - kSpare_J);
   state.most_given_J = std::max(state.most_given_J, state.given_J);
 }
@@ -75,7 +76,7 @@ glm::dvec3 keep_passive(const PassivityOptions& options, PassivityState& state, 
   ++state.felt;
   state.depth_m = std::max(0.0, state.depth_m - expected_J / size);
   if (expected_J > 0.0) {
-    // A spring that ends where the force began stores half of (force · depth).
+    // A spring whose force is zero where the force began stores half of (force · depth).
     const double stored_J = std::max(0.0, -state.given_J);
     const double needed_J = std::max(expected_J, 0.5 * size * state.depth_m);
     if (needed_J > stored_J) state.share = std::min(state.share, stored_J / needed_J);

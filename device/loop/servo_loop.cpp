@@ -9,7 +9,7 @@
 namespace device {
 namespace {
 
-// Writes zero force however the loop ends.
+// Writes zero force at the end of the loop, also after an exception.
 class ZeroForceAtEnd {
  public:
   ZeroForceAtEnd(HapticDevice& device, double dt_s) : device_(device), dt_s_(dt_s) {}

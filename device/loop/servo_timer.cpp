@@ -26,8 +26,8 @@ std::int64_t now_ns() noexcept {
 }
 
 std::string lock_memory() {
-  // With MCL_FUTURE under a finite limit, a later ordinary allocation would fail. So future pages are locked
-  // only without a limit, which a privileged process may request.
+  // With MCL_FUTURE and a finite limit, later allocations could fail. So future pages are locked only if
+  // there is no limit. A privileged process may remove the limit.
   rlimit unlimited{RLIM_INFINITY, RLIM_INFINITY};
   rlimit limit{};
   const bool no_limit = setrlimit(RLIMIT_MEMLOCK, &unlimited) == 0 ||
@@ -72,7 +72,7 @@ ServoTimer::ServoTimer(double period_s) {
 }
 
 std::string ServoTimer::raise_priority() {
-  // Memory first, so that its pages are loaded before the thread can starve others.
+  // Memory is locked first, so that its pages are loaded before the thread can starve others.
   const std::string memory = lock_memory();
   return take_servo_priority() + memory;
 }

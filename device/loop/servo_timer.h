@@ -10,11 +10,11 @@ namespace device {
 class ServoTimer {
  public:
   explicit ServoTimer(double period_s);
-  // Requests SCHED_FIFO and locked memory for the calling thread. Returns in words what was granted and what
-  // was not.
+  // Requests SCHED_FIFO for the calling thread, and locked memory. Returns a text that says which requests
+  // were granted.
   std::string raise_priority();
-  // Sleeps until the next period begins. Returns how late the thread woke (unit: second). Periods that were
-  // missed entirely are counted and skipped, not made up in a burst.
+  // Sleeps until the next period begins. Returns the delay of the wake-up (s). Periods that were missed
+  // entirely are counted and skipped; their ticks do not follow in a burst.
   double wait() noexcept;
   [[nodiscard]] std::uint64_t missed() const noexcept { return missed_; }
 

@@ -18,21 +18,21 @@ constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP};
 constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 
 std::atomic<int> stop_requested{0};
-std::mutex stops_guard;   // of the two below
+std::mutex stops_guard;   // guards stops_installed and stops_before
 int stops_installed = 0;  // objects of StopOnSignal
 struct CrashAct {
   std::atomic<OnCrash::Act> act{nullptr};
   std::atomic<void*> user{nullptr};
 };
 std::array<CrashAct, OnCrash::kMost> crash_acts{};
-std::size_t crash_count = 0;  // used by the thread that creates them
+std::size_t crash_count = 0;  // objects of OnCrash; used only by the thread that creates them
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<void*>::is_always_lock_free);
 
-// Previous actions; written before the handlers are installed, and read by them.
+// Previous actions: written before the handlers are installed, and read by the handlers.
 std::array<struct sigaction, kStops.size()> stops_before{};
 std::array<struct sigaction, kCrashes.size()> crashes_before{};
 
-// Whoever starts a program may choose that a closed terminal does not end it (nohup).
+// A user may start a program so that it outlives its terminal (nohup): then SIGHUP stays ignored.
 bool stays_ignored(std::size_t i) {
   return kStops[i] == SIGHUP && stops_before[i].sa_handler == SIG_IGN;
 }
@@ -45,7 +45,8 @@ void restore_stops() noexcept {
   }
 }
 
-// From the first signal on each of them ends the program at once.
+// Handles the first signal. It restores the previous actions, so that any further signal ends the program at
+// once.
 extern "C" void hybrid_on_stop(int signal) {
   stop_requested.store(signal);
   restore_stops();
@@ -56,14 +57,14 @@ extern "C" void hybrid_on_stop(int signal) {
 }
 
 extern "C" void hybrid_on_crash(int signal) {
-  // Each act runs once: if one crashes itself, the handler continues with those that are left.
+  // Each act runs once. If an act itself crashes, the handler is called again and runs the remaining acts.
   for (std::size_t i = crash_acts.size(); i-- > 0;) {
     if (const OnCrash::Act act = crash_acts[i].act.exchange(nullptr)) act(crash_acts[i].user.load());
   }
   for (std::size_t i = 0; i < kCrashes.size(); ++i) {
     if (kCrashes[i] == signal) sigaction(signal, &crashes_before[i], nullptr);
   }
-  raise(signal);  // delivered when this handler returns, whether the signal was caused or sent
+  raise(signal);  // takes the previous action, both for a signal from a fault and for one that was sent
 }
 
 }  // namespace

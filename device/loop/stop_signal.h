@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Signals: what runs ends early and in order when it is told to stop. A session that crashes turns the motors
-// off first.
+// Signals. On a request to stop, running work ends early and in order. A session that crashes turns the
+// motors off first.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,9 @@
 namespace device {
 
 // While an object exists, the first SIGINT, SIGTERM or SIGHUP asks for an end in order: servo loops end, and
-// stop_if_asked() throws. Any further one kills as usual. A SIGHUP that was ignored stays so (nohup). Objects
-// may overlap, on any thread; the first one installs the handlers, the last one restores what was there.
+// stop_if_asked() throws. Any further signal kills as usual. A SIGHUP that the program was started to ignore
+// (nohup) stays ignored. Several objects may exist at a time, on any thread. The first one installs the
+// handlers; the last one restores the previous handlers.
 class StopOnSignal {
  public:
   StopOnSignal();
@@ -20,10 +21,10 @@ class StopOnSignal {
   StopOnSignal& operator=(StopOnSignal&&) = delete;
 };
 
-// The signal that was received while an object of StopOnSignal exists, or 0. Lock-free.
+// The signal that came while objects of StopOnSignal exist; otherwise 0. Lock-free.
 int stop_signal() noexcept;
 
-// Thrown through long work that is told to stop. No std::exception, so that nobody takes it for an error.
+// Thrown out of long work after a signal. Not a std::exception, so that no handler takes it for an error.
 struct StopAsked {
   int signal = 0;
 };
@@ -31,9 +32,10 @@ struct StopAsked {
 void stop_if_asked();
 
 // While an object exists, SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT call `act(user)` on the thread that
-// crashed, and then take their previous effect. `act` must be safe in a signal handler. Not covered: a stack
-// overflow, SIGKILL and a machine that stops. Of several objects the newest acts first; if it crashes, the
-// others still act. They must be destroyed in reverse order. Throws std::logic_error for more than kMost.
+// crashed, and then have their previous effect. `act` must be safe in a signal handler. Not covered: a stack
+// overflow, SIGKILL and a machine that stops. Of several objects the newest acts first; if its `act` crashes,
+// the others still act. Objects must be destroyed in reverse order. Throws std::logic_error if there are more
+// than kMost objects.
 class OnCrash {
  public:
   static constexpr std::size_t kMost = 4;

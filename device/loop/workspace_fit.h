@@ -38,9 +38,9 @@ struct WorkspaceFit {
   }
 };
 
-// Maps centre to centre. Without a given scale, the smallest one of at least 1 is chosen for which the
-// workspace (device frame) covers `wanted` (scene frame). Both boxes must be finite, and the workspace must
-// have an extent on every axis.
+// Maps the centre of the workspace (device frame) to that of `wanted` (scene frame). Without a given scale,
+// the smallest scale of at least 1 is chosen for which the workspace covers `wanted`. Both boxes must be
+// finite, and the workspace must have an extent on every axis.
 WorkspaceFit fit_workspace(const Box& workspace, const Box& wanted, std::optional<double> scale) noexcept;
 // Whether the workspace covers `wanted` on every axis.
 bool covers(const WorkspaceFit& fit, const Box& workspace, const Box& wanted) noexcept;

@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::string_view_literals;
 
-// Names of one unit, parted by blanks, in lower case; µ is written as u.
+// Names of one unit in lower case, separated by blanks; µ is written as u.
 struct UnitNames {
   std::string_view names;
   Unit unit;
@@ -47,17 +47,17 @@ constexpr std::array kUnits{
 enum class Meaning : std::uint8_t {
   axis,        // x, y or z
   position,    // a word for a position
-  bearer,      // a word for what is at the position, or for a part of a message
+  bearer,      // a word for the thing at the position (tool, marker), or for a part of a message
   force,       // a word for a force
   strength,    // a word for the magnitude of a force
   time,        // a word for a time
   clock,       // a word for the clock of a time
-  nothing,     // a word that changes nothing
-  turning,     // tx, ty, tz: a torque, or a translation where the file has no forces
-  not_wanted,  // a word for another quantity, whatever stands beside it
+  nothing,     // a word without effect on the meaning
+  turning,     // tx, ty, tz: a torque; in a file without forces a translation
+  not_wanted,  // a word for another quantity: the column is not read, whatever its other words
   unknown
 };
-// Words of one meaning, parted by blanks, in lower case.
+// Words of one meaning in lower case, separated by blanks.
 struct Words {
   std::string_view words;
   Meaning meaning;
@@ -79,7 +79,7 @@ constexpr std::array kWords{
           "orientation rotation quaternion quat",
           Meaning::not_wanted}};
 
-// Is `word` one of `list`, whose words blanks part?
+// Is `word` one of the words of `list`, which are separated by blanks?
 bool is_one_of(std::string_view word, std::string_view list) {
   for (std::size_t at = list.find(word); at != std::string_view::npos; at = list.find(word, at + 1)) {
     const std::size_t end = at + word.size();
@@ -104,8 +104,9 @@ bool is_word_character(char c) {
   return is_upper(c) || is_lower(c) || (c >= '0' && c <= '9');
 }
 
-// In ASCII: both micro signs as u, the degree sign as deg, the middle dot and the powers as marks of a
-// compound unit, and no-break spaces as blanks; from UTF-8, and where one byte stands alone from Latin-1.
+// Replaces some signs by ASCII: both micro signs by u, the degree sign by deg, the middle dot by * and powers
+// by ^ (marks of a compound unit), no-break spaces by blanks. Signs may be in UTF-8 or, as one byte, in
+// Latin-1.
 std::string in_ascii(std::string_view text) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kSigns{{{"\xC2\xB5"sv, "u"sv},
                                                                                   {"\xCE\xBC"sv, "u"sv},
@@ -133,16 +134,17 @@ std::string in_ascii(std::string_view text) {
 
 struct NamePart {
   std::string text;  // as written
-  bool glued;        // a capital alone parts it from the word before: "Ms" of "timeMs"
+  bool glued;        // only a capital separates it from the word before: "Ms" in "timeMs"
 };
 
-// Does a capital begin a word at `at`, as in "timeMs" and, before a small letter, in "posYMm"?
+// Does a capital at `at` begin a word? It does after a small letter ("timeMs") or before one ("posYMm").
 bool begins_word(std::string_view run, std::size_t at) {
   const bool small_follows = at + 1 < run.size() && is_lower(run[at + 1]);
   return is_upper(run[at]) && (is_lower(run[at - 1]) || small_follows);
 }
 
-// Words of letters and digits, parted by other characters and by capitals, unless both are a unit ("mN").
+// Splits a name into words of letters and digits, at other characters and at capitals. A unit with a capital
+// ("mN") is not split.
 std::vector<NamePart> name_parts(std::string_view text) {
   std::vector<NamePart> parts;
   for (std::size_t at = 0; at < text.size();) {
@@ -170,7 +172,7 @@ std::vector<NamePart> name_parts(std::string_view text) {
 
 struct StatedUnit {
   std::optional<Unit> unit{};
-  std::string unknown{};  // a text in the place of a unit that is none
+  std::string unknown{};  // text in the place of a unit that is no known unit
 
   void state(std::string_view text, std::optional<Unit> found) {
     if (!found || (unit && (unit->dimension != found->dimension || unit->in_si != found->in_si)))
@@ -179,7 +181,8 @@ struct StatedUnit {
   }
 };
 
-// Cuts out what stands in brackets: units, words of the name, and in `unclear` what is neither.
+// Removes brackets with their contents. A unit goes to `stated`, words of known meaning stay in the name, and
+// all other contents go to `unclear`.
 std::string without_brackets(std::string_view text, StatedUnit& stated, std::vector<std::string>& unclear) {
   constexpr std::string_view kOpen = "[({<", kClose = "])}>";
   std::string rest;
@@ -200,7 +203,7 @@ std::string without_brackets(std::string_view text, StatedUnit& stated, std::vec
   return rest.append(text);
 }
 
-// Cuts off a unit behind '/', as in "x/mm" and "v/m/s".
+// Removes a unit after '/', as in "x/mm" and "v/m/s".
 void cut_slash(std::string& text, StatedUnit& stated) {
   for (std::size_t slash = text.find('/'); slash != std::string::npos; slash = text.find('/', slash + 1)) {
     const std::string_view behind = without_blanks(std::string_view(text).substr(slash + 1));
@@ -213,7 +216,7 @@ void cut_slash(std::string& text, StatedUnit& stated) {
   }
 }
 
-// Cuts off the last words that are units, as in "x_mm", "x_in_mm" (in millimetres) and "x_m_s" (a velocity).
+// Removes words at the end that are units, as in "x_mm", "x_in_mm" (in millimetres) and "x_m_s" (a velocity).
 void cut_unit_words(std::vector<NamePart>& parts, StatedUnit& stated) {
   const auto as_unit = [](const NamePart& part) {
     return unit_in(part.glued ? lower_ascii(part.text) : part.text);
@@ -221,7 +224,7 @@ void cut_unit_words(std::vector<NamePart>& parts, StatedUnit& stated) {
   std::size_t first = parts.size();
   while (first > 1 && (as_unit(parts[first - 1]) || lower_ascii(parts[first - 1].text) == "per")) --first;
   if (first == parts.size()) {
-    // "Mm" is no word, and no unit either: say so.
+    // A text such as "Mm" is neither a word nor a known unit: it is reported as an unknown unit.
     if (parts.size() > 1 && unit_in(lower_ascii(parts.back().text))) {
       stated.state(parts.back().text, std::nullopt);
       parts.pop_back();
@@ -239,7 +242,7 @@ void cut_unit_words(std::vector<NamePart>& parts, StatedUnit& stated) {
   parts.resize(first);
 }
 
-// The words of a name: in lower case, with an axis parted from its quantity ("fx" is "f" and "x").
+// The words of a name in lower case. An axis is split from its quantity: "fx" becomes "f" and "x".
 std::vector<std::string> words_of(std::span<const NamePart> parts) {
   std::vector<std::string> words;
   const auto part_axis = [&](std::string_view axis, std::string_view of) {
@@ -320,7 +323,7 @@ std::optional<Unit> unit_in(std::string_view written) {
   std::string_view text = without_blanks(ascii);
   if (text.ends_with('.')) text.remove_suffix(1);           // "sec."
   if (text == "Nm" || text == "mNm") return Unit{};         // a torque; nm is a length
-  if (is_one_of(text, "MN Mm Ms NM")) return std::nullopt;  // mega, or a capital out of place
+  if (is_one_of(text, "MN Mm Ms NM")) return std::nullopt;  // mega-units, or a misplaced capital
   const std::string lower = lower_ascii(text);
   const auto found = std::find_if(kUnits.begin(), kUnits.end(),
                                   [&](const UnitNames& u) { return is_one_of(lower, u.names); });
@@ -333,7 +336,7 @@ std::optional<Unit> unit_in(std::string_view written) {
 
 ColumnName read_column_name(std::string_view name) {
   std::string ascii = in_ascii(name);
-  // Capitals tell units apart (MN, mN) only beside small letters.
+  // Capitals distinguish units (MN, mN) only if the name also has small letters.
   if (std::none_of(ascii.begin(), ascii.end(), is_lower)) ascii = lower_ascii(ascii);
   StatedUnit stated;
   std::vector<std::string> unclear;
@@ -341,7 +344,7 @@ ColumnName read_column_name(std::string_view name) {
   cut_slash(text, stated);
   std::vector<NamePart> parts = name_parts(text);
   cut_unit_words(parts, stated);
-  // Brackets that hold no unit belong to the name where the unit stands elsewhere.
+  // Text in brackets that is no unit belongs to the name if the unit stands elsewhere.
   for (const std::string& words : unclear) {
     if (!stated.unit) {
       stated.state(words, std::nullopt);

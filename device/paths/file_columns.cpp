@@ -23,7 +23,7 @@ std::string how_to_name(const MeasuredFile& measured) {
              : "name them in a heading, or with --columns, as in " + std::string(kMeasuredExample);
 }
 
-// Three columns of one quantity, one for each axis.
+// The columns of one vector, one for each axis.
 struct Vector {
   std::string of_what;
   int rank = 0;
@@ -34,7 +34,8 @@ struct Vector {
   [[nodiscard]] std::string name() const { return of_what.empty() ? "''" : of_what; }
 };
 
-// The columns of one list of names. `problem` tells why they are not clear.
+// The columns that a list of names describes. `problem` says why they are missing or ambiguous; empty: they
+// are clear.
 class NamedColumns {
  public:
   NamedColumns(const MeasuredFile& measured, const Names& names) : measured_(measured), names_(names) {
@@ -59,7 +60,7 @@ class NamedColumns {
 
   std::array<std::optional<FileColumn>, roles> role{};
   std::string problem;
-  std::size_t recognised = 0;  // columns of a quantity that is read
+  std::size_t recognised = 0;  // number of columns whose quantity is known
 
  private:
   void add(std::vector<Vector>& vectors, std::size_t i) {
@@ -142,7 +143,7 @@ class NamedColumns {
   }
 
   void choose_time() {
-    std::vector<std::size_t> best;  // of the lowest rank
+    std::vector<std::size_t> best;  // columns of the lowest rank
     for (std::size_t i = 0; i < read_.size(); ++i) {
       if (read_[i].quantity != Quantity::time) continue;
       if (!best.empty() && read_[i].rank > read_[best[0]].rank) continue;
@@ -156,7 +157,7 @@ class NamedColumns {
     }
   }
 
-  // The requested force, the one without a name before it, or the only one.
+  // Chooses the requested force; without a request, the force without a prefix or the only force.
   void choose_force() {
     const std::string wanted = joined_words(measured_.force);
     auto chosen =
@@ -217,7 +218,7 @@ bool is_row_of_numbers(std::string_view line, Separator separator) {
   return any;
 }
 
-// Below the names may stand a row of their units.
+// If `line`, below the names, is a row of units: adds the units to the names and returns true.
 bool add_units(std::string_view line, Separator separator, Names& names) {
   const Names units = names_in(line, separator);
   Names with_units = names;
@@ -267,7 +268,8 @@ class Finder {
     out_.count = names.size();
   }
 
-  // The separator with which a heading names all that is needed; if none does, the one with most known names.
+  // Takes the first separator with which the heading names all that is needed. If there is none, takes the
+  // separator with the most known names.
   void by_heading(const std::optional<Separator>& stated) {
     Names best;
     std::size_t most = 0;
@@ -340,7 +342,7 @@ class Finder {
   FileColumns out_;
 };
 
-// The decimal mark of the columns that are read: the first clear number from line `first` on decides.
+// Finds the decimal mark: the first clear number in a column that is read, from line `first` on, decides.
 void find_decimal_mark(const MeasuredFile& measured, std::size_t first, FileColumns& columns) {
   LineReader reader(measured.file);
   std::vector<std::string_view> fields;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which column of a text file holds what, in which unit, and how its rows are written. One reader for paths
-// and for measured forces.
+// The columns of a text file: which quantity each holds, in which unit, and how rows are written. Paths and
+// measured forces share this reader.
 #pragma once
 
 #include <array>
@@ -36,19 +36,21 @@ struct FileColumn {
 
 struct FileColumns {
   std::array<std::optional<FileColumn>, roles> role{};
-  std::size_t count = 0;   // fields of a row
-  std::size_t needed = 0;  // fields up to the last column that is read
+  std::size_t count = 0;   // number of named columns
+  std::size_t needed = 0;  // fields that a row needs: up to the last column that is read
   Separator separator = Separator::comma;
   DecimalMark mark = DecimalMark::point;
   bool has_row = false;  // `line` holds the first row
   std::vector<std::string> notes;
 };
 
-// Reads the heading, if there is one, and the units below it; else the columns are those of
-// `measured.columns`, of a comment, or of their count. `line` is the file's first. Refuses what is not clear.
+// Finds the columns: those of `measured.columns` if it is not empty, else those of the heading, with a row of
+// units below it. Without a heading they follow from a comment, or from their number. `line` is the first
+// line of the file, and afterwards the first row. Refuses ambiguous columns (PathError).
 FileColumns find_file_columns(const MeasuredFile& measured, LineReader& reader, std::string_view& line);
 
-// The fields of a row; empty for a row of separators alone. Refuses fields without a name, and too few.
+// Sets `fields` to those of a row; empty for a row of separators alone. Throws PathError: too few fields, or
+// fields beyond the named columns.
 void split_row(const LineReader& reader, const FileColumns& columns, std::string_view line,
                std::vector<std::string_view>& fields);
 

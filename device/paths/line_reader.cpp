@@ -21,7 +21,7 @@ constexpr std::size_t kChunk = 65'536;  // bytes read at once
 constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF"sv;
 constexpr std::string_view kUtf16Remedy = "save it as UTF-8 (iconv -f UTF-16 -t UTF-8)"sv;
 
-// Files that are no plain text, by their first bytes.
+// Formats other than plain UTF-8 text, by their first bytes.
 struct OtherFormat {
   std::string_view begins, is;
 };
@@ -80,7 +80,7 @@ bool LineReader::next_raw() {
   for (bool ended = false; !ended;) {
     if (at_ == filled_ && !fill()) {
       if (text_.empty()) return false;
-      break;  // the last line has no end
+      break;  // the last line ends with the file
     }
     const char* const begin = buffer_.data() + at_;
     const char* const end = buffer_.data() + filled_;
@@ -111,12 +111,12 @@ bool LineReader::next_raw() {
   return true;
 }
 
-// More bytes into the buffer; false at the end of the file.
+// Reads more bytes into the buffer; false at the end of the file.
 bool LineReader::fill() {
   at_ = 0;
   const int got = gzread(zlib(stream_), buffer_.data(), static_cast<unsigned>(buffer_.size()));
   filled_ = got > 0 ? static_cast<std::size_t>(got) : 0;
-  // Checked also if bytes were read, because a truncated file ends with a part of them.
+  // Errors are checked even if bytes were read, because a truncated file still yields some bytes.
   int error = Z_OK;
   gzerror(zlib(stream_), &error);
   if (error != Z_OK) {

@@ -12,8 +12,8 @@
 
 namespace device {
 
-// The lines of a text file that end with LF, CR LF or CR alone. Throws PathError: no such file, unreadable,
-// truncated, not text, not UTF-8 by its byte-order mark.
+// Reads lines that end with LF, CR LF or CR alone. Throws PathError: no such file, unreadable, truncated, not
+// text, or UTF-16 or UTF-32 by its byte-order mark.
 class LineReader {
  public:
   explicit LineReader(const std::filesystem::path& file);
@@ -23,8 +23,8 @@ class LineReader {
   LineReader& operator=(LineReader&&) = delete;
   ~LineReader();
 
-  // The next line that is not blank, without its end; false at the end of the file. `line` holds until the
-  // next call. A line that begins with '#' or '%' is a comment; the last one is kept.
+  // Sets `line` to the next line that is neither blank nor a comment, without its end; false at the end of
+  // the file. `line` is valid until the next call. A comment begins with '#' or '%'; the last one is kept.
   bool next(std::string_view& line);
   // Throws PathError "file:line: what"; by default at the current line.
   [[noreturn]] void refuse(const std::string& what, std::size_t line = 0) const;
@@ -43,17 +43,17 @@ class LineReader {
   std::string text_, comment_;
   std::vector<char> buffer_;
   std::size_t at_ = 0, filled_ = 0;  // in buffer_
-  bool after_cr_ = false;            // a line feed that comes next belongs to the last line
+  bool after_cr_ = false;            // a line feed that follows belongs to the end of the last line
   bool began_ = false;
 };
 
-// Without blanks and tabs at both ends.
+// The text without blanks, tabs and line ends at both ends.
 std::string_view without_blanks(std::string_view text);
-// Lower case, of ASCII letters alone: the same in every locale.
+// Turns ASCII letters, and only these, into lower case: the same in every locale.
 std::string lower_ascii(std::string_view text);
 // At most 40 characters in quotation marks, for a message. A byte outside ASCII is shown as '?'.
 std::string shown(std::string_view text);
-// Four digits, for messages. The decimal mark is a point in every locale.
+// The number with four significant digits, for messages. The decimal mark is a point in every locale.
 std::string short_number(double value);
 
 }  // namespace device

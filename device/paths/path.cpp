@@ -31,8 +31,8 @@ void require_duration(double hold_s) {
   throw PathError("path: a hold of " + short_number(hold_s) + " s; it must be a number not below 0");
 }
 
-// Positions at ascending times, linear in between, `repeat` times over. Repeated polylines end where they
-// begin.
+// Positions at ascending times, with linear interpolation, repeated `repeat` times. A repeated polyline must
+// end where it begins.
 class PolylinePath final : public Path {
  public:
   explicit PolylinePath(Trajectory trajectory, int repeat = 1)
@@ -50,7 +50,7 @@ class PolylinePath final : public Path {
     const double in_cycle_s = std::fmod(t_s, cycle_s_);
     const auto after = std::upper_bound(times.begin(), times.end(), in_cycle_s);
     if (after == times.end()) return positions.back();
-    // Not 0, because the first time is 0.
+    // i is at least 1, because the first time is 0.
     const auto i = static_cast<std::size_t>(after - times.begin());
     const double share = (in_cycle_s - times[i - 1]) / (times[i] - times[i - 1]);
     return positions[i - 1] + (positions[i] - positions[i - 1]) * share;
@@ -81,8 +81,8 @@ class LissajousCurve final : public Path {
   std::vector<std::string> notes_;
 };
 
-// Builds a polyline from straight legs and stays. Legs of no duration are left out, so that times are
-// strictly ascending.
+// Builds a polyline from straight legs and holds. Legs without duration are left out, so that times ascend
+// strictly.
 class PolylineBuilder {
  public:
   PolylineBuilder(const glm::dvec3& start_m, double speed_m_per_s) : speed_(speed_m_per_s) {
@@ -110,7 +110,7 @@ class PolylineBuilder {
       polyline_.t_s.push_back(t_s);
       polyline_.position_m.push_back(position_m);
     } else {
-      polyline_.position_m.back() = position_m;  // a leg of no duration
+      polyline_.position_m.back() = position_m;  // a leg without duration
     }
     return *this;
   }

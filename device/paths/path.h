@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Target of a simulated hand over time: press, slide, waypoints, Lissajous figure or recorded trajectory.
+// The target of a simulated hand over time: a press, slide, waypoints, Lissajous figure or recorded
+// trajectory.
 #pragma once
 
 #include <filesystem>
@@ -48,9 +49,9 @@ struct LissajousPath {
   double duration_s = 10.0;
 };
 
-// Columns of a CSV file (also .gz) at any rate, linear between samples. Their names are matched whole, and
-// their units are those of the names (column_names.h); a length without one is in `unit_m`, a time in
-// seconds. Time starts at the first sample.
+// Columns of a CSV file (also .gz) at any rate; the path is linear between samples. Quantities and units
+// follow from the columns' names (column_names.h). Lengths without a unit are in `unit_m`, times in seconds.
+// Time 0 is the first sample.
 struct CsvPath {
   std::filesystem::path file;
   double unit_m = 1.0;
@@ -59,8 +60,8 @@ struct CsvPath {
 
 using PathDescription = std::variant<PressPath, SlidePath, WaypointPath, LissajousPath, CsvPath>;
 
-// A path ready to be followed. position() is pure and allocates nothing. Before 0 and after the duration it
-// returns the end points.
+// A path ready to be followed. position() is pure and allocates nothing. Before time 0 it returns the first
+// point, and after the duration the last one.
 class Path {
  public:
   Path() = default;

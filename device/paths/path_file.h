@@ -16,8 +16,8 @@ struct Trajectory {
   std::vector<std::string> notes;      // repeated times, gaps, assumed units
 };
 
-// As read_measured() of a path (trajectory_file.h). Throws PathError with file and line; also for a unit or
-// an offset out of range.
+// Reads as read_measured() does with `as_path` (trajectory_file.h), and adds the offset. Throws PathError
+// with file and line, and for a unit or an offset out of range.
 Trajectory read_trajectory(const CsvPath& csv);
 
 // A path along the trajectory. Throws PathError if it has no samples.

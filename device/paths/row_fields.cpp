@@ -22,10 +22,10 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-// The length of what parts groups of digits at `at`; 0: nothing does. `mark` is the decimal mark.
+// The length in bytes of the grouping mark at `at`; 0: there is none. `mark` is the decimal mark.
 std::size_t grouping_at(std::string_view field, std::size_t at, DecimalMark mark) {
   const std::string_view other = mark == DecimalMark::point ? ","sv : "."sv;
-  // Apostrophes, a blank, and the narrow, thin and no-break ones in UTF-8.
+  // The other mark, apostrophes, a blank, and in UTF-8 the no-break, narrow no-break and thin spaces.
   for (const std::string_view parts :
        {other, "'"sv, " "sv, "\xE2\x80\x99"sv, "\xC2\xA0"sv, "\xE2\x80\xAF"sv, "\xE2\x80\x89"sv}) {
     if (field.substr(at).starts_with(parts)) return parts.size();
@@ -33,7 +33,8 @@ std::size_t grouping_at(std::string_view field, std::size_t at, DecimalMark mark
   return 0;
 }
 
-// The number as std::from_chars reads it; empty if its groups are none, or it is longer than `text`.
+// The number in the form that std::from_chars reads, in `text`. Empty: its groups are malformed, or it is too
+// long.
 std::string_view ungrouped(std::string_view field, DecimalMark mark, std::array<char, kLongest>& text) {
   if (field.empty() || field.size() > text.size()) return {};
   std::size_t size = 0, at = 0;
@@ -84,7 +85,7 @@ bool split_at_blanks(std::string_view line, std::vector<std::string_view>& field
   return true;
 }
 
-// The end of the quotation that begins at `at`; a doubled mark is part of it.
+// The closing mark of the quotation that begins at `at`. A doubled mark is part of the quotation.
 std::size_t quotation_end(std::string_view line, std::size_t at) {
   std::size_t end = line.find('"', at + 1);
   while (end != std::string_view::npos && line.substr(end).starts_with("\"\"")) end = line.find('"', end + 2);
@@ -143,7 +144,7 @@ Separator separator_of_numbers(std::string_view line) {
     if (line.find(static_cast<char>(separator)) != std::string_view::npos) return separator;
   }
   if (line.find(',') == std::string_view::npos) return Separator::blanks;
-  // Decimal commas stand between two digits, once in a number; between the numbers then are blanks.
+  // If every field between blanks is a number with a decimal comma, the separator is blanks.
   std::vector<std::string_view> fields;
   if (!split_fields(line, Separator::blanks, fields) || fields.size() < 2) return Separator::comma;
   const bool decimal = std::all_of(fields.begin(), fields.end(), [](std::string_view field) {
@@ -161,7 +162,7 @@ ShownMark shown_mark(std::string_view field) {
   if (last == std::string_view::npos) return ShownMark::none;
   const bool is_point = digits[last] == '.';
   const auto of_last = is_point ? points : commas, others = is_point ? commas : points;
-  if (of_last > 1) return is_point ? ShownMark::comma : ShownMark::point;  // the last mark parts groups
+  if (of_last > 1) return is_point ? ShownMark::comma : ShownMark::point;  // the last mark is for groups
   const std::size_t begin = digits.find_first_of("0123456789.,");
   const std::size_t before = last - begin;
   const bool could_be_group = digits.size() - last - 1 == kGroup && field.size() == digits.size() &&

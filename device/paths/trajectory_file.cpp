@@ -16,11 +16,11 @@ namespace {
 
 constexpr double kGapFactor = 10.0;  // a step longer than this many median steps is a gap
 constexpr double kDay_s = 86'400.0;
-// Seconds since 1970 from September 2001 to the end of 2099. A first time in this range, but for a power of
-// 1000, is a clock of milliseconds, microseconds or nanoseconds since 1970.
+// Seconds since 1970, from September 2001 to the end of 2099. If a first time without a unit lies in this
+// range when read as ms, µs or ns, it counts milliseconds, microseconds or nanoseconds since 1970.
 constexpr double kEpochFrom_s = 1e9, kEpochTo_s = 4.1e9;
-constexpr double kLatest_s = 1e11;      // seconds since the year 0 stay below it
-constexpr double kSlowestStep_s = 1.0;  // a usual step from this on makes a unit of seconds doubtful
+constexpr double kLatest_s = 1e11;      // above all seconds since the year 0
+constexpr double kSlowestStep_s = 1.0;  // if the median step is this long, the unit may not be seconds
 
 struct ClockUnit {
   double in_s;
@@ -124,7 +124,7 @@ class RowReader {
       reader_.refuse("the recording lasts longer than a day, " + short_number(t_s) +
                      " s so far; state the unit of its times in the heading, as in t_ms or t_ns, or cut it");
     }
-    if (!out_.t_s.empty() && t_s == out_.t_s.back()) {  // the later sample replaces the earlier
+    if (!out_.t_s.empty() && t_s == out_.t_s.back()) {  // the later sample replaces the earlier one
       if (repeated_++ == 0) first_repeated_line_ = reader_.line();
     } else {
       out_.t_s.push_back(t_s);
@@ -141,8 +141,8 @@ class RowReader {
     ++rows_;
   }
 
-  // Since the first sample. Of a clock the difference is taken before rounding: nanoseconds since 1970 have
-  // 19 digits.
+  // Time since the first sample. The first time is subtracted before the conversion to double, because
+  // nanoseconds since 1970 have 19 digits.
   double time_s() {
     if (!columns_.role[role_time]) return static_cast<double>(rows_) / measured_.rate_hz;
     FileColumn& column = *columns_.role[role_time];
@@ -193,7 +193,7 @@ class RowReader {
   FileColumns columns_;
   MeasuredTrajectory out_;
   std::vector<std::string_view> fields_;
-  long double first_ = 0.0L;  // in the unit of its column
+  long double first_ = 0.0L;  // the first time, in the unit of its column
   std::size_t rows_ = 0, repeated_ = 0, first_repeated_line_ = 0;
 };
 

@@ -20,7 +20,7 @@ constexpr const char* kOpenHints =
     "(groups dialout, plugdev); delete a stale configuration in the home folder, or name the right one by "
     "GTDD_HOME";
 
-// The driver's default device is opened without a name or, in some editions, by one of these.
+// The driver's default device is opened without a name or, in some editions, under one of these names.
 constexpr std::array<const char*, 3> kDefaultNames{nullptr, "Default Device", "Default PHANToM"};
 
 std::string quoted(const char* name) {
@@ -86,7 +86,7 @@ hd::ErrorInfo HdConnection::take_errors() const noexcept {
 }
 
 void HdConnection::init(const HdOpenOptions& options) {
-  (void)take_errors();  // errors from before are not ours
+  (void)take_errors();  // discards earlier errors
   std::string said;
   for (int attempt = 0; attempt < options.attempts; ++attempt) {
     if (attempt > 0) std::this_thread::sleep_for(std::chrono::duration<double>(options.pause_s));
@@ -102,7 +102,7 @@ void HdConnection::init(const HdOpenOptions& options) {
         return;
       }
       if (handle != hd::kInvalidHandle) call().disable_device(handle);
-      // Without a licence no other name and no retry helps.
+      // Without a licence neither another name nor a retry helps.
       if (error.code == hd::kInvalidLicense) throw DeviceError("PHANToM: " + hd_error_in_words(error));
       const std::string why = error.code == hd::kSuccess ? "no such device" : hd_error_in_words(error);
       said += "\n  " + quoted(name) + ": " + why;
@@ -170,7 +170,7 @@ void HdConnection::read_info() {
   std::array<int, hd::kMaxValues> style{};
   call().get_integers(hd::kCalibrationStyle, style.data());
   if (take_errors().code == hd::kSuccess) info_.calibration_style = style[0];
-  // The driver's own guards in addition: it clamps the force, and ramps it after an interruption.
+  // The driver also has guards of its own: it clamps the force, and ramps it after an interruption.
   for (const hd::Name guard : {hd::kForceClamping, hd::kForceRamping}) {
     call().enable(guard);
     (void)take_errors();  // not every device has them
@@ -193,7 +193,7 @@ void HdConnection::start_scheduler() {
 bool HdConnection::update_calibration(bool by_hand) {
   const int style = info_.calibration_style;
   CalibrationCall wish{.call = &call(), .handle = handle_, .style = 0, .by_hand = by_hand};
-  // Of several styles the one that asks least of the user; the last match wins.
+  // Of several styles the one that needs the least action of the user is taken: the last match.
   for (const int one : {hd::kEncoderReset, hd::kInkwell, hd::kAutomatic}) {
     if ((style & one) != 0) wish.style = static_cast<hd::Name>(one);
   }

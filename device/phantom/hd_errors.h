@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The driver's errors: what each means for the user at the device, and for the servo loop.
+// The driver's errors: a text and a remedy for the user, and the effect on the servo loop.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace device {
 
 enum class HdOutcome : std::uint8_t {
   none,   // no error
-  rest,   // zero force, then back by a ramp
+  rest,   // zero force for a while, then a ramp
   ended,  // the device is lost for this session
 };
 
@@ -27,10 +27,10 @@ struct HdErrorText {
 // The entry for a code; an unknown code ends the session. Never allocates.
 const HdErrorText& hd_error_text(hd::Name code) noexcept;
 
-// "HD_COMM_ERROR (0x302): what; remedy", with the driver's internal code if there is one.
+// A text such as "HD_COMM_ERROR (0x302): what; remedy", with the driver's internal code if there is one.
 std::string hd_error_in_words(const hd::ErrorInfo& error);
 
-// How to calibrate a device of this style (bit mask of hd::kEncoderReset, kAutomatic, kInkwell).
+// Says how to calibrate a device of this style (bit mask of hd::kEncoderReset, kAutomatic, kInkwell).
 std::string_view calibration_remedy(int style) noexcept;
 
 }  // namespace device

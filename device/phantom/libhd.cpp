@@ -26,7 +26,7 @@ bool says(const std::string& text, std::string_view part) {
   return text.find(part) != std::string::npos;
 }
 
-// True if the loader did not find `name` itself, as opposed to one of its dependencies.
+// True if the loader did not find the library `name` itself; false if it missed one of its dependencies.
 bool is_absent(const std::string& words, const std::string& name) {
   return words.starts_with(name + ":") && says(words, "No such file");
 }
@@ -75,7 +75,7 @@ void* open_usual(std::string& file) {
     std::string words;
     file = name;
     if (void* library = open(name, words)) return library;
-    // A library that exists but does not load is the intended one.
+    // A library that exists but does not load is taken for the intended one, so no other name is tried.
     if (!is_absent(words, name)) refuse_broken(file, words);
     tried.append(tried.empty() ? "" : ", ").append(file);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The driver's own library (libHD of OpenHaptics), loaded at run time. The build needs nothing of it, and on
-// a machine without it the error says what to install.
+// The driver's own library (libHD of OpenHaptics), loaded at run time. The build does not need it. On a
+// machine without it the error says what to install.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace device {
 
-// A device that cannot be used; what() says why, and what to do about it.
+// The device cannot be used. what() gives the reason and the remedy.
 class DeviceError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -33,7 +33,7 @@ struct ErrorInfo {
 static_assert(sizeof(ErrorInfo) == 12, "returned by value: its size is part of the calling convention");
 
 inline constexpr double kMillimeter = 1e-3;  // the driver's unit of length, in meters
-// Read at once; the driver may report errors without end.
+// Errors that are read at a time; bounded, because the driver may report errors without end.
 inline constexpr int kMaxErrors = 16;
 inline constexpr std::size_t kMaxValues = 16;  // array size that holds any parameter
 
@@ -68,7 +68,7 @@ inline constexpr Name kSchedulerFull = 0x501, kInvalidLicense = 0x600;
 
 }  // namespace hd
 
-// The functions of the library that are used. All are present after loading.
+// The library's functions that this program uses. After loading none is null.
 struct HdFunctions {
   hd::Handle (*init_device)(const char* name) = nullptr;
   void (*disable_device)(hd::Handle) = nullptr;
@@ -95,13 +95,13 @@ struct HdFunctions {
 
 struct HdLibrary {
   HdFunctions call;
-  std::string file;  // as requested
+  std::string file;  // path or name with which it was loaded
 };
 
-// Loads `file`, otherwise the file that the environment variable HYBRID_LIBHD names, otherwise libHD.so,
-// libHD.so.3.4 or libHD.so.3.0. A named file that does not load is an error; no other is tried. The library
-// stays loaded to the end of the program, because the driver keeps threads in it. Throws DeviceError: none
-// found, a dependency missing, a function missing.
+// Loads `file`. If that is empty, loads the file that the environment variable HYBRID_LIBHD names; without
+// it, libHD.so, libHD.so.3.4 or libHD.so.3.0. If a named file does not load, no other file is tried. The
+// library stays loaded to the end of the program, because the driver's threads run in it. Throws DeviceError:
+// no library found, a dependency missing, a function missing.
 HdLibrary load_libhd(const std::filesystem::path& file = {});
 
 }  // namespace device

@@ -25,11 +25,11 @@ std::int64_t monotonic_ns() noexcept {
   return now.tv_sec * 1'000'000'000 + now.tv_nsec;
 }
 
-// Properties that the driver does not report, as quoted for the model (device/README.md).
+// Commonly quoted figures (device/README.md) for properties that the driver does not report.
 DeviceLimits quoted_limits(std::string_view model) {
   const auto says = [model](std::string_view part) { return model.find(part) != std::string_view::npos; };
   if (says("Premium 1.5")) return device_limits(DeviceModel::premium_1_5);
-  if (says("Touch X") || says("Desktop")) return {};  // different from the Touch
+  if (says("Touch X") || says("Desktop")) return {};  // unknown; their figures differ from the Touch's
   if (says("Touch") || says("Omni")) return device_limits(DeviceModel::touch);
   return {};
 }
@@ -107,7 +107,7 @@ class Phantom final : public PhantomDevice {
     if (schedule == hd::kInvalidHandle || schedule == ~hd::Schedule{0} || error.code == hd::kSchedulerFull) {
       throw DeviceError("PHANToM: the driver takes no servo callback: " + hd_error_in_words(error));
     }
-    // The driver has one error stack for all threads: this error may be the callback's.
+    // The driver has one error stack for all threads, so this error may come from the callback.
     if (error.code != hd::kSuccess) servo.report_error(error);
     const bool silent = !wait_for(servo);
     if (silent) give_up(servo, schedule);
@@ -124,7 +124,7 @@ class Phantom final : public PhantomDevice {
   }
 
  private:
-  // False: the driver no longer ticks.
+  // Waits for the end of the loop. False: the driver no longer calls ticks.
   bool wait_for(PhantomServo& servo) const {
     std::uint64_t seen = servo.ticks();
     SteadyClock::time_point changed = SteadyClock::now();
@@ -142,9 +142,9 @@ class Phantom final : public PhantomDevice {
     return true;
   }
 
-  // Sends zero force from this thread, as the driver's no longer runs.
+  // Sends zero force from this thread, because the driver's thread no longer runs.
   void give_up(PhantomServo& servo, hd::Schedule schedule) const noexcept {
-    servo.stop();  // should the driver resume: zero force, no computation
+    servo.stop();  // if the driver resumes, its tick sends zero force and computes nothing
     constexpr std::array<double, 3> kNothing{};
     const HdFunctions& call = connection_.call();
     call.begin_frame(connection_.handle());

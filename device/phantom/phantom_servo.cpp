@@ -18,7 +18,7 @@ namespace device {
 namespace {
 
 constexpr std::uint64_t kTemperatureEvery = 64;  // ticks between readings
-constexpr double kWarm = 0.8;  // fraction of the permitted temperature that is worth a message
+constexpr double kWarm = 0.8;  // share of the permitted temperature above which a message is given
 
 long thread_number() noexcept {
   return syscall(SYS_gettid);
@@ -78,13 +78,13 @@ unsigned int PhantomServo::tick() noexcept {
   if (share > 0.0) state_.fault = DeviceFault::none;
   set_force(share * options_.fit.force(answer.force_N));
   call_.end_frame(handle_);
-  take_errors();  // errors from this force are handled in the next tick, unless they end the session
+  take_errors();  // errors of this force take effect in the next tick, unless they end the session
   if (reason_ == Reason::none) return hd::kContinue;
   call_.begin_frame(handle_);
   return end_with_zero_force();
 }
 
-// The frame is open when this returns.
+// Begins the frame, which is open when the function returns.
 bool PhantomServo::begin() noexcept {
   const std::int64_t now_ns = options_.clock_ns();
   if (last_ns_ == 0) thread_.store(thread_number());
@@ -117,7 +117,7 @@ void PhantomServo::read() noexcept {
   if (is_finite(p) && is_finite(v)) {
     state_.position_m = options_.fit.position(hd::kMillimeter * p);
     state_.velocity_m_per_s = options_.fit.velocity(hd::kMillimeter * v);
-  } else {  // keep the last valid position, with zero force
+  } else {  // the last valid position is kept, with zero force
     ++nonfinite_;
     state_.velocity_m_per_s = glm::dvec3(0.0);
     gate_.close();
@@ -172,7 +172,7 @@ void PhantomServo::set_force(const glm::dvec3& force_device_N) noexcept {
   call_.set_doubles(hd::kForce, values.data());
 }
 
-// Ends the open frame with zero force; it is the last one.
+// Ends the open frame with zero force. It is the session's last frame.
 unsigned int PhantomServo::end_with_zero_force() noexcept {
   set_force(glm::dvec3(0.0));
   call_.end_frame(handle_);
@@ -181,7 +181,8 @@ unsigned int PhantomServo::end_with_zero_force() noexcept {
   return hd::kDone;
 }
 
-// The program is crashing: zero force in every tick, and never done, so that no other thread continues.
+// Called while the program is crashing: sends zero force in every tick. done() stays false, so that no other
+// thread continues.
 unsigned int PhantomServo::hold_zero_force() noexcept {
   call_.begin_frame(handle_);
   set_force(glm::dvec3(0.0));
@@ -214,14 +215,14 @@ void PhantomServo::on_crash(void* servo) noexcept {
   auto& self = *static_cast<PhantomServo*>(servo);
   self.crashed_.store(true);
   if (self.thread_.load() == thread_number()) {
-    // The servo thread itself crashed, perhaps within a frame. The driver sends forces after the callback,
-    // which will not return, so this may have no effect.
+    // The servo thread itself crashed, perhaps within a frame. This may have no effect, because the driver
+    // sends forces after the callback has returned, and here the callback will not return.
     constexpr std::array<double, 3> kNothing{};
     self.call_.set_doubles(hd::kForce, kNothing.data());
     self.call_.end_frame(self.handle_);
     return;
   }
-  // The next tick sends zero force; wait a few ticks for it.
+  // The next tick of the servo thread sends zero force. This thread waits up to 10 ms for it.
   for (int i = 0; i < 20 && !self.crash_zeroed_.load() && !self.done(); ++i) {
     constexpr timespec kHalfMillisecond{0, 500'000};
     nanosleep(&kHalfMillisecond, nullptr);

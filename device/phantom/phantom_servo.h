@@ -17,8 +17,8 @@
 
 namespace device {
 
-// Counts the driver's errors by code and keeps the first of each. Of fixed size, because the callback fills
-// it.
+// Counts the driver's errors by code and keeps the first error of each code. Its size is fixed, because the
+// callback fills it and must not allocate.
 class ErrorTally {
  public:
   void add(const hd::ErrorInfo& error) noexcept;
@@ -31,7 +31,7 @@ class ErrorTally {
   };
   std::array<Row, 16> rows_{};
   std::size_t size_ = 0;
-  std::uint64_t beyond_ = 0;
+  std::uint64_t beyond_ = 0;  // errors of codes that have no row
 };
 
 struct PhantomServoOptions {
@@ -40,29 +40,30 @@ struct PhantomServoOptions {
   double deadline_s = 10e-3;
   std::int64_t (*clock_ns)() noexcept = nullptr;  // required
   double dt_s = 1e-3;
-  double max_force_N = 0.0;  // 0: unknown, not clamped here
+  double max_force_N = 0.0;  // 0: unknown; the force is then not clamped here
   WorkspaceFit fit;
   bool has_safety_switch = false;
 };
 
-// Exists for one serve(). on_tick() belongs to the driver's thread; the rest may be called from any thread.
+// Exists for one call of serve(). on_tick() is called by the driver's thread; other functions may be called
+// by any thread.
 class PhantomServo {
  public:
   PhantomServo(const HdFunctions& call, hd::Handle handle, const PhantomServoOptions& options,
                ServoFunction tick);
 
-  // The callback. It never allocates, locks, throws or does I/O of its own.
+  // The servo callback; `servo` is a PhantomServo. It never allocates, locks, throws or does I/O of its own.
   static unsigned int on_tick(void* servo) noexcept;
   // For OnCrash: safe in a signal handler.
   static void on_crash(void* servo) noexcept;
 
   void stop() noexcept { stop_.store(true); }
-  // Passes on an error that another thread took from the driver's error stack.
+  // Hands an error that another thread took from the driver's error stack to the next tick.
   void report_error(const hd::ErrorInfo& error) noexcept;
   [[nodiscard]] bool done() const noexcept { return done_.load(std::memory_order_acquire); }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_.load(std::memory_order_relaxed); }
 
-  // Valid after done(), or once the driver is silent.
+  // Valid once done() is true, or once the driver calls no more ticks.
   [[nodiscard]] ServoReport report() const;
   [[nodiscard]] const std::exception_ptr& thrown() const noexcept { return thrown_; }
 
@@ -88,7 +89,7 @@ class PhantomServo {
   const PhantomServoOptions options_;
   const ServoFunction function_;
 
-  // The driver's thread only, until done().
+  // Used only by the driver's thread until done() is true.
   ForceGate gate_;
   DeviceState state_;
   std::int64_t last_ns_ = 0;

@@ -20,10 +20,10 @@ namespace device {
 namespace {
 
 // Velocity as a driver estimates it: the change of the encoders over the last `span_s`, divided by the time.
-// A shorter span is noisier (step / span), a longer one lags more (half the span).
+// A shorter span has more noise (encoder step / span), a longer one more lag (half the span).
 class VelocityEstimate {
  public:
-  // One nanosecond less, so that eight ticks of 1 kHz count as 8 ms despite rounding.
+  // The span is shortened by one nanosecond, so that eight ticks of 1 kHz count as 8 ms despite rounding.
   explicit VelocityEstimate(double span_s) : span_s_(span_s - 1e-9) {}
   void start(const glm::dvec3& position_m) noexcept { samples_[0] = {0.0, position_m}; }
 
@@ -32,7 +32,7 @@ class VelocityEstimate {
     samples_[++newest_ % kSize] = {now_s, position_m};
     if (newest_ - oldest_ >= kSize) oldest_ = newest_ - kSize + 1;
     while (oldest_ + 1 < newest_ && samples_[(oldest_ + 1) % kSize].t_s <= now_s - span_s_) ++oldest_;
-    // Times are shifted back, because only differences count and large times lose digits.
+    // Times are shifted back to 0. Only differences are used, and large times would lose digits.
     if (now_s <= kRewind_s) return;
     for (std::size_t i = oldest_; i <= newest_; ++i) samples_[i % kSize].t_s -= now_s;
   }
@@ -46,7 +46,7 @@ class VelocityEstimate {
 
  private:
   static constexpr std::size_t kSize = 512;   // enough for 8 ms at up to 64 kHz
-  static constexpr double kRewind_s = 100.0;  // times are shifted back after this
+  static constexpr double kRewind_s = 100.0;  // later times are shifted back
   struct Sample {
     double t_s = 0.0;
     glm::dvec3 position_m{0.0};
@@ -109,7 +109,7 @@ class SimulatedDevice final : public HapticDevice {
     const auto slots = static_cast<std::size_t>(options_.delay_ticks) + 1;
     delayed_forces_[written_ % slots] = force_N;
     ++written_;
-    drive_motors(delayed_forces_[written_ % slots], dt_s);  // the oldest
+    drive_motors(delayed_forces_[written_ % slots], dt_s);  // the oldest force
     since_write_s_ = 0.0;
     elapse(dt_s);
   }
@@ -133,7 +133,7 @@ class SimulatedDevice final : public HapticDevice {
     return path_->position(t_s) + tremor.amplitude_m / std::sqrt(1.5) * circle;
   }
 
-  // Amplifier saturation and slew rate. A force that is not finite is not applied.
+  // Sets the motors' force, within saturation and slew rate. A force that is not finite counts as 0.
   void drive_motors(const glm::dvec3& force_N, double dt_s) noexcept {
     const double most_N = options_.mechanism.limits.max_force_N;
     const double strength = glm::length(force_N);
@@ -144,7 +144,7 @@ class SimulatedDevice final : public HapticDevice {
     motor_N_ = length > longest ? motor_N_ + step * (longest / length) : wanted;
   }
 
-  // Advances the time under the motors' force, until the watchdog switches them off.
+  // Advances by dt_s. The motors' force acts until the watchdog switches the motors off.
   void elapse(double dt_s) noexcept {
     const double watchdog_s = options_.watchdog_s.value_or(std::numeric_limits<double>::infinity());
     const double driven_s = std::clamp(watchdog_s - since_write_s_, 0.0, dt_s);
@@ -236,10 +236,10 @@ std::unique_ptr<HapticDevice> make_simulated_device(DeviceModel model, const Han
   return std::make_unique<IdealDevice>(std::move(path));
 }
 
-// device/README.md gives the source of each value.
+// device/DECISIONS.md ("simulated: figures of the devices") gives the source of each value.
 const Mechanism& mechanism(DeviceModel model) noexcept {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  // No maker states it; it is small compared with a hand's 4 to 7 N·s/m.
+  // No maker states it. The value is small compared with a hand's 4 to 7 N·s/m.
   constexpr double kViscous_N_s_per_m = 0.005;
   static constexpr Mechanism kIdeal{"ideal device (simulated)", {kNone, kNone, 0.0, 0.0}, 0.0, 0.0};
   static constexpr Mechanism kPremium{"PHANToM Premium 1.5 (simulated)",

@@ -15,35 +15,36 @@
 namespace device {
 
 enum class DeviceModel : std::uint8_t {
-  ideal,        // follows the path exactly under any force: tests models, not loops
+  ideal,        // follows the path exactly under any force; for tests of models, not of loops
   premium_1_5,  // 8.5 N, 3.5 N/mm, 0.03 mm, 75 g, 0.04 N
   touch,        // 3.3 N, 0.055 mm, 45 g, 0.26 N
 };
 
-// A mechanism as data. A linear one (for comparison with theory) has an infinite max_force_N, and
+// Data of a mechanism. A linear mechanism, for comparison with theory, has an infinite max_force_N, and a
 // resolution_m and friction_N of 0.
 struct Mechanism {
   std::string_view name;
   DeviceLimits limits;
   double apparent_mass_kg = 0.0;
   double viscous_N_s_per_m = 0.0;  // of the mechanism, relative to the ground
-  // Slew rate of the motors' force; no maker states it.
+  // Slew rate of the motors' force. No maker states one.
   double motor_slew_N_per_s = std::numeric_limits<double>::infinity();
 };
 // The ideal device has infinite force and stiffness; mass, resolution and friction are 0.
 [[nodiscard]] const Mechanism& mechanism(DeviceModel model) noexcept;
 
-// Mass, damper and spring about the moving target. Hajian & Howe: 3.5–8.7 g, 4–7.4 N·s/m, 255–1255 N/m.
+// A hand: a mass on a damper and a spring about the moving target. Ranges measured by Hajian & Howe (1997):
+// 3.5–8.7 g, 4–7.4 N·s/m, 255–1255 N/m.
 struct HandModel {
   double mass_kg = 0.006;
   double damping_N_s_per_m = 5.0;
   double stiffness_N_per_m = 600.0;
 };
 enum class Grip : std::uint8_t { loose, medium, firm };
-// The ends of those ranges (loose, firm), and the default (medium).
+// The ends of the ranges of Hajian & Howe (loose, firm), or the default (medium).
 [[nodiscard]] HandModel hand_of(Grip grip) noexcept;
 
-// Physiological tremor has 8 to 12 Hz. A resting fingertip shakes by about 0.1 mm.
+// Physiological tremor has a frequency of 8 to 12 Hz. A resting fingertip shakes by about 0.1 mm.
 struct HandTremor {
   double amplitude_m = 0.0;  // radius of the target's circle, in the plane normal to (1, 1, 1)
   double frequency_hz = 10.0;
@@ -54,7 +55,7 @@ struct SimulatedDeviceOptions {
   HandModel hand{};
   HandTremor tremor{};
   // Whole ticks (writes) between a written force and the motors, at most kMaxDelayTicks. Add a delay of the
-  // measurement here too: apart from the first ticks a loop cannot tell the two apart.
+  // measurement too: after the first ticks both delays have the same effect on a loop.
   int delay_ticks = 0;
   // The motors switch off if no write has come for this long. Empty: no watchdog.
   std::optional<double> watchdog_s{};
@@ -62,12 +63,13 @@ struct SimulatedDeviceOptions {
 };
 inline constexpr int kMaxDelayTicks = 64;
 
-// A device with the mechanics of tool_mechanics.h. The tool starts at rest at the path's first position.
-// Throws std::invalid_argument in words: no path, no mass at all, a delay out of range, a value below 0 or
-// not finite (max_force_N, max_stiffness_N_per_m, motor_slew_N_per_s and workspace_m may be infinite).
+// Makes a device with the mechanics of tool_mechanics.h. The tool starts at rest at the path's first
+// position. Throws std::invalid_argument: no path, neither mechanism nor hand has a mass, a delay out of
+// range, a value below 0 or not finite (max_force_N, max_stiffness_N_per_m, motor_slew_N_per_s and
+// workspace_m may be infinite).
 std::unique_ptr<HapticDevice> make_simulated_device(const SimulatedDeviceOptions& options,
                                                     std::shared_ptr<const Path> path);
-// The same with the values of a model. `ideal` follows its path whatever the force and the hand.
+// The same with the values of a model. The ideal device follows its path, whatever the force and the hand.
 std::unique_ptr<HapticDevice> make_simulated_device(DeviceModel model, const HandModel& hand,
                                                     std::shared_ptr<const Path> path);
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr glm::dvec3 kRest(0.0);
 
-// Time for which friction of `most_N` holds the tool against a linearly growing pull.
+// Time (s) for which friction of at most `most_N` holds the tool against a pull that changes linearly.
 double stick_time_s(const glm::dvec3& pull_N, const glm::dvec3& growth_N_per_s, double most_N) noexcept {
   const double spare = most_N * most_N - glm::dot(pull_N, pull_N);
   if (spare < 0.0) return 0.0;
@@ -19,7 +19,7 @@ double stick_time_s(const glm::dvec3& pull_N, const glm::dvec3& growth_N_per_s, 
   if (growth2 <= 0.0) return std::numeric_limits<double>::infinity();
   const double along = glm::dot(pull_N, growth_N_per_s);
   const double root = std::sqrt(along * along + growth2 * spare);
-  // The larger root, in the form that does not cancel.
+  // The larger root, in the form without cancellation.
   return along > 0.0 ? spare / (root + along) : (root - along) / growth2;
 }
 
@@ -31,10 +31,10 @@ struct ToolIntegrator::AppliedForces {
 
   [[nodiscard]] glm::dvec3 target(double at_s) const noexcept { return target_m + at_s * target_m_per_s; }
 
-  // The motion after the linear flow, with a constant `friction_N`.
+  // The motion after flow.time_s under a constant `friction_N`. It begins at_s after the start of the step.
   [[nodiscard]] ToolMotion after(const LinearFlow& flow, const ToolMotion& motion, double at_s,
                                  const glm::dvec3& friction_N) const noexcept {
-    // Relative to the target; but the mechanism's viscous friction is relative to the ground.
+    // The flow is relative to the target. The mechanism's viscous friction is relative to the ground.
     const glm::dvec3 speed = motion.velocity_m_per_s - target_m_per_s;
     const glm::dvec3 pull = (motor_N + friction_N - viscous_N_s_per_m * target_m_per_s +
                              stiffness_N_per_m * (target(at_s) - motion.position_m)) /
@@ -60,7 +60,7 @@ const LinearFlow& ToolIntegrator::flow(double time_s) noexcept {
   return slot;
 }
 
-// One substep in which the tool moves or begins to.
+// One substep in which the tool moves or begins to move.
 double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, double at_s,
                             const LinearFlow& step) const noexcept {
   const double most_N = mechanics_.coulomb_N, step_s = step.time_s;
@@ -68,10 +68,10 @@ double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, doubl
   const double speed = glm::length(motion.velocity_m_per_s);
   const double lost = most_N * step_s / mechanics_.mass_kg;  // speed lost to friction
   glm::dvec3 along = speed > 0.0 ? motion.velocity_m_per_s / speed : free_end;
-  // An implicit direction, because friction turns a slow motion within far less than a substep. For v in the
-  // middle, v = w − ½·lost·v/|v| with w the middle without friction, so v has the direction of w. A slower
-  // motion uses the direction at the end. A motion that reverses keeps its own direction and is stopped
-  // first.
+  // The direction of friction is implicit, because friction turns a slow motion within much less than a
+  // substep. Let v be the velocity in the middle of the substep, and w the same without friction. Then
+  // v = w − ½·lost·v/|v|, so v has the direction of w. A motion slower than `lost` uses the direction at the
+  // end instead. A motion that reverses keeps its own direction, and is stopped first.
   const glm::dvec3 middle = speed > lost ? motion.velocity_m_per_s + free_end : free_end;
   if (const double length = glm::length(middle);
       length > 0.0 && (speed <= 0.0 || glm::dot(middle, along) > 0.5 * length)) {
@@ -82,9 +82,9 @@ double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, doubl
   const double before = glm::dot(motion.velocity_m_per_s, along),
                after = glm::dot(moved.velocity_m_per_s, along);
   double time_s = step_s;
-  if (after <= 0.0) {  // it stops within the substep
+  if (after <= 0.0) {  // the tool stops within the substep
     if (before > 0.0) {
-      // False position: over a substep the speed falls almost linearly.
+      // The method of false position finds the moment: over a substep the speed falls almost linearly.
       double low_s = 0.0, low = before, high_s = step_s, high = after;
       for (int i = 0; i < 4; ++i) {
         time_s = low_s + (high_s - low_s) * (low / (low - high));
@@ -99,8 +99,8 @@ double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, doubl
     moved.velocity_m_per_s = kRest;
   }
   if (glm::dot(moved.position_m - motion.position_m, along) < 0.0) {
-    // The tool oscillates within the substep, and friction in this direction would have pushed it along. Its
-    // impulse is taken from the motion at the end instead.
+    // The tool oscillates within the substep, and friction in this direction would have done positive work.
+    // So friction instead takes its impulse from the motion at the end.
     time_s = step_s;
     moved = pull.after(step, motion, at_s, kRest);
     const double left = glm::length(moved.velocity_m_per_s);
@@ -110,15 +110,15 @@ double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, doubl
   return time_s;
 }
 
-// Stick and slip: holds while friction can, then slips in substeps.
+// Stick and slip: the tool rests as long as friction can hold it, then slips in substeps.
 void ToolIntegrator::advance_with_friction(ToolMotion& motion, const AppliedForces& pull,
                                            double dt_s) noexcept {
   constexpr double kMaxSubsteps = 50'000.0;
-  // A tick that is a whole number of substeps up to rounding is not divided once more.
+  // Rounding does not add a substep to a tick that is a whole number of substeps.
   const double step_s = dt_s / std::clamp(std::ceil(dt_s / max_substep_s_ - 1e-6), 1.0, kMaxSubsteps);
   const double nothing_s = 1e-9 * step_s;
   double at_s = 0.0;
-  // Terminates: after a stop within a substep the tool sticks, or slips for a whole substep.
+  // The loop terminates: after a stop within a substep the tool sticks, or slips for a whole substep.
   while (dt_s - at_s > nothing_s) {
     if (motion.velocity_m_per_s == kRest) {
       const double stiffness = mechanics_.hand_stiffness_N_per_m;

@@ -29,31 +29,31 @@ inline constexpr double kToolSubstep_s = 1e-4;
 // Moves the tool under a constant motor force, while the hand's target moves at constant velocity.
 //
 // Mass, spring and damper follow their closed form, so without friction a step of any length is exact.
-// Coulomb friction has a constant magnitude and opposes the motion. Its direction is frozen over a substep,
-// at that of the substep's middle. The rest is linear with a constant force, so
+// Coulomb friction has a constant magnitude and opposes the motion. Over a substep its direction is constant:
+// that of the motion in the middle of the substep. So in each substep friction is a constant force, and
 //   - along a straight line friction is exact too, up to the moment of stopping, which is solved for;
 //   - on a curve the error falls with the square of the substep;
 //   - friction stops a motion exactly, never reverses it, and holds a tool at rest to the last bit,
-//     until the pull exceeds it at a moment that is solved for;
+//     until the pull exceeds friction, at a moment that is solved for;
 //   - no energy is created: the linear flow creates none, and the work of friction is checked in each
 //     substep.
-// Backward Euler is no alternative, because its numerical damping would move the stability boundary.
+// Backward Euler cannot be used here, because its numerical damping would move the stability boundary.
 class ToolIntegrator {
  public:
   explicit ToolIntegrator(const ToolMechanics& mechanics, double max_substep_s = kToolSubstep_s)
       : mechanics_(mechanics), max_substep_s_(max_substep_s) {}
 
-  // Advances by dt_s. A dt_s that is not positive and finite moves nothing. A time above five seconds is
-  // divided into 50,000 longer substeps, so that the call stays bounded.
+  // Advances by dt_s. Nothing moves if dt_s is not positive and finite. Under friction, a dt_s above five
+  // seconds is divided into 50,000 longer substeps, so that the work stays bounded.
   void advance(ToolMotion& motion, const glm::dvec3& target_start_m, const glm::dvec3& target_end_m,
                const glm::dvec3& motor_force_N, double dt_s) noexcept;
 
  private:
-  struct AppliedForces;  // the forces on the tool
+  struct AppliedForces;
   [[nodiscard]] LinearFlow new_flow(double time_s) const noexcept;
   [[nodiscard]] const LinearFlow& flow(double time_s) noexcept;  // cached
   void advance_with_friction(ToolMotion& motion, const AppliedForces& pull, double dt_s) noexcept;
-  // Returns the time until the tool stopped, or the whole substep.
+  // Moves the tool by one substep, or until it stops. Returns the time that this took (s).
   double slip(ToolMotion& motion, const AppliedForces& pull, double at_s,
               const LinearFlow& step) const noexcept;
 
