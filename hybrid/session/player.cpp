@@ -95,7 +95,7 @@ bool Player::tick_is_due(const PlayRequest& request) noexcept {
   return true;
 }
 
-// After a drag the tool stays at its last goal until a restart.
+// After a drag the tool stays at the last goal of the drag until a restart.
 void Player::steer(const PlayRequest& request) noexcept {
   if (request.restarts != restarts_) {
     restarts_ = request.restarts;
