@@ -23,7 +23,7 @@ Depth depth_in_box(const glm::dvec3& p, const glm::dvec3& h) {
   return {-beyond[d], out};
 }
 
-// Force of the tissue at an indentation.
+// Force of the tissue at an indentation (m), without the coupling.
 double tissue_force(const ClosedForm& form, const Tool& tool, double indentation) {
   const double modulus = form.young_Pa / (1.0 - form.poisson * form.poisson);
   if (tool.shape == Tool::Shape::punch) return 2.0 * tool.radius_m * modulus * indentation;
