@@ -16,8 +16,8 @@ namespace hybrid {
 struct ComparedModel {
   std::string name;
   std::vector<TraceRow> rows;
-  // Depth of the device in the object in each tick (m), if known. Empty: the device's travel since the first
-  // touch of a contact, against the reference's largest force in it.
+  // Depth of the device in the object in each tick (m), if known. If empty, force is drawn over the device's
+  // travel since the first touch of a contact, opposite to the reference's largest force in that contact.
   std::vector<double> depth_m{};
   // Drawn below the others, over its own time. Useful for a model that still pulls when the others have let
   // go.
