@@ -40,7 +40,7 @@ class FileOnItsWay {
   bool open() noexcept;
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
   bool keep() noexcept;
-  // true after a failed keep(): all bytes are in FilePlace::temporary, which stays.
+  // Returns true after a failed keep(): all bytes are in FilePlace::temporary, which stays.
   [[nodiscard]] bool left_beside() const noexcept { return left_beside_; }
 
  private:

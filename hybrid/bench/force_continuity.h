@@ -15,8 +15,8 @@ namespace hybrid::bench {
 enum class Smooth : std::uint8_t { homogeneous, layered, oblique };
 const char* smooth_name(Smooth block);
 
-// A ball that strokes a block of 1 mm voxels, or the side of a ball of such voxels, whose layers are oblique
-// to the surface.
+// The tool, a ball, strokes a block of 1 mm voxels, or the side of a ball of such voxels. In the latter no
+// layer of voxels lies along the surface.
 struct StrokeCase {
   Smooth block = Smooth::homogeneous;
   double radius_spacings = 4.0;

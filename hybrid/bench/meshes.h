@@ -38,7 +38,6 @@ std::size_t bench_mesh_triangles(const std::string& name);
 bool is_bench_mesh_file(std::string_view name);
 // Loads a mesh file and moves the middle of its box to the origin. `notes`: gets its defects in words. Throws
 // polygon::MeshError.
-// polygon::MeshError.
 BenchMesh load_bench_mesh(const std::string& file, double unit_m, std::vector<std::string>& notes);
 
 // The ball of mesh geo<frequency>.

@@ -199,7 +199,7 @@ void OccupancyBench::check(OccupancyRow& r, std::span<const QueryBox> boxes) con
   const OccupancyEngine other = by_tree  ? OccupancyEngine::cgal_aabb
                                 : by_map ? OccupancyEngine::map
                                          : OccupancyEngine::brute;
-  if (other == OccupancyEngine::brute && !voxels()) return;  // there is no other engine to compare with
+  if (other == OccupancyEngine::brute && !voxels()) return;  // no tree to compare the map with
   r.reference = engine_name(other);
   const std::size_t most = other == OccupancyEngine::brute ? 10 : options_.quick ? 200 : 2000;
   static thread_local Found mine, theirs;

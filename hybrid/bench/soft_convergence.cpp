@@ -42,7 +42,8 @@ Object corner() {
   return object;
 }
 
-// All voxels move at once to the mean of their links' places, so a voxel and its neighbours swing in turns.
+// All voxels move at once to the mean of the places that their links require. So a voxel and its neighbours
+// swing in turns.
 // (With the sum it would diverge.)
 Object block() {
   Object object = object_of({15, 15, 8}, {7, 7, 7}, voxel::ThesisChainMailOptions::Movement::mean);

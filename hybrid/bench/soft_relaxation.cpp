@@ -25,7 +25,7 @@ namespace {
 constexpr double kDepth = 10.0, kRadius = 10.0;  // unit: spacing
 constexpr int kSweepsNear = 2;
 constexpr double kConverged = 0.01;
-constexpr double kAsked_us = 100e3;  // time at which the force's error is stated
+constexpr double kAsked_us = 100e3;  // working time after which the force's error is stated
 constexpr int kMostRounds = 4000;
 constexpr double kCalm = 1e-4;   // share of the force; the force is calm if it changes by less …
 constexpr int kCalmRounds = 30;  // … for so many rounds; then the measurement ends
@@ -199,7 +199,7 @@ SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_
     row.note = fmt::format("not within 1 % of {:.4f} N when relaxation ended, after {:.0f} ms: {:.4f} N",
                            reference, 1e-3 * us, moments.back().force_N);
   } else {
-    const double reached = last_off.base()->us;  // the moment after the last one that was off
+    const double reached = last_off.base()->us;  // the moment after the last one with an error above 1 %
     row.time_us = Percentiles{reached, reached, reached, reached};
     row.note = fmt::format("until within 1 % of {:.4f} N", reference);
   }

@@ -12,7 +12,7 @@
 
 namespace hybrid::bench {
 
-// hybrid: the product. classic: the thesis's own algorithm (voxel/baseline/thesis_chainmail.h).
+// `hybrid`: the product. `classic`: the thesis's own algorithm (voxel/baseline/thesis_chainmail.h).
 enum class SoftEngine : std::uint8_t { hybrid, classic };
 inline constexpr std::array kSoftEngines{SoftEngine::hybrid, SoftEngine::classic};
 const char* engine_name(SoftEngine engine);
@@ -28,7 +28,7 @@ struct SoftRow {            // empty members: the row has no such figure
   std::optional<std::size_t> moved{};     // voxels away from rest, by an independent inspection
   std::optional<std::size_t> violated{};  // links beyond their limits, by an independent inspection
   std::optional<Percentiles> time_us{};   // of waves or ticks, or of what the note names
-  // Classic's p50 over this engine's, with the same inputs in the same run.
+  // The p50 of classic over this engine's, with the same inputs in the same run.
   std::optional<double> speedup{};
   std::optional<double> ns_per_voxel_update{};
   std::optional<double> truncated_share{};

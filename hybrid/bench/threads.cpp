@@ -24,7 +24,7 @@ namespace hybrid::bench {
 namespace {
 
 constexpr std::size_t kHogged = std::size_t{128} << 20U;  // bytes of each of two buffers
-// Bytes that are copied between two calls of `meanwhile`.
+// Bytes copied between two calls of `meanwhile`.
 constexpr std::size_t kPiece = std::size_t{1} << 20U;
 constexpr double kAsOftenAsItCan_hz = 1e6;
 

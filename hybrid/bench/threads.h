@@ -34,13 +34,13 @@ struct ThreadsRow {
 };
 
 // Loads, in turns:
-//   relaxation: the session's relaxation thread, which also publishes surfaces as often as it can. Besides,
-// another session of the scene is relaxed and its surfaces are taken without a pause.
-//   memory: instead, a thread that copies 256 MB to and fro. The session before is played again with its
-// inputs. The copying thread hands its asynchronous results to the ticks that applied them. So another core
-// wrote the results here, too.
-//   nothing relaxed: as `memory`, but no result ever arrives. It shows the cost of ticks that have less to
-// do.
+//   relaxation       the session's relaxation thread, which also publishes surfaces as often as it can.
+//                    Besides, another session of the scene is relaxed, and its surfaces are taken, without a
+//                    pause.
+//   memory           instead, a thread that copies 256 MB to and fro. The session before is played again with
+//                    its inputs. The copying thread hands its asynchronous results to the ticks that applied
+//                    them. So another core wrote the results here, too.
+//   nothing relaxed  as `memory`, but no result ever arrives: the cost of ticks that have less to do.
 // Throws SceneError.
 std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options);
 

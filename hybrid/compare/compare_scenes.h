@@ -55,8 +55,8 @@ struct ScenesComparison {
 };
 
 // `samples`: at most so many ticks of each scene are compared with its own slow run (SessionOptions); 0:
-// none.
-// Throws SceneError; std::runtime_error: tools of another shape or size, or devices at another rate.
+// none. Throws SceneError. Throws std::runtime_error: tools of another shape or size, or devices at another
+// rate.
 ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, const Progress& progress);
 
 // The size of a built scene before a session.

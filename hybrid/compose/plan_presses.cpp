@@ -234,7 +234,7 @@ class HeightMap {
     facet_[index(u, v)] = facet;
   }
 
-  // Draws the pixels that the triangle covers, and those of its corners, so that no triangle is too small.
+  // Draws the pixels that the triangle covers, and those of its corners, so that no triangle is lost.
   void draw(const Facet& f, std::uint32_t number) {
     std::array<glm::dvec2, 3> p{};
     std::array<double, 3> h{};

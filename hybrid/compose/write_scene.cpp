@@ -12,7 +12,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kToolShare = 0.02;  // radius of the tool, as a share of the longest object
-constexpr double kCoupling = 800.0;  // N/m; stable in every grip of `hybrid stability`
+constexpr double kCoupling = 800.0;  // N/m; does not buzz in any grip, see `hybrid stability`
 
 // The text as a quoted string of TOML. Names and titles come from files, so any character may occur.
 std::string quoted(const std::string& text) {

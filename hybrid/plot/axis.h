@@ -11,7 +11,7 @@
 
 namespace hybrid {
 
-// symmetric: linear from −1 to 1. Beyond that each power of ten is as long as the part from 0 to 1.
+// `symmetric` is linear from −1 to 1. Beyond that each power of ten is as long as the part from 0 to 1.
 enum class Scale : std::uint8_t { linear, logarithmic, symmetric };
 
 using Intervals = std::vector<std::pair<double, double>>;  // each has a beginning and an end; in rising order

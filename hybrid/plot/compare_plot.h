@@ -33,7 +33,7 @@ struct ReferenceCurve {
 struct ComparePlotOptions {
   std::size_t reference = 0;  // index of the model with which the others are compared
   double jnd_share = 0.07;    // a hand distinguishes forces that differ by this share
-  double jnd_floor_N = 0.04;  // but by at least this force
+  double jnd_floor_N = 0.04;  // least difference that a hand distinguishes
 };
 
 // Parts that the figures of comparisons share. signed_jnd(): difference of the vectors in JND, negative if

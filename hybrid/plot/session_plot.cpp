@@ -127,7 +127,7 @@ Panel force_panel(std::span<const TraceRow> rows, const std::vector<double>& t,
   };
   if (count(false) > 0) panel.series.push_back({"rigid objects", t, std::move(rigid), series_colour(0)});
   if (count(true) > 0) panel.series.push_back({"soft objects", t, std::move(soft), series_colour(1)});
-  // If there are several things of a kind, each gets a dashed line. It is a part of the sums above.
+  // If there are several things of a kind, each gets a dashed line. Its force is a part of the sums above.
   std::size_t colour = 2;
   for (const Touched& thing : things) {
     if (thing.force_N.empty() || count(thing.soft) < 2 || colour >= kSeriesColours) continue;

@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-// spacings; at a greater distance the half-space's distance is exact enough
+// Unit: spacings. At a greater distance the half-space's distance is exact enough.
 constexpr double kExactWithin = 1.0;
 
 // Distance from a voxel's ball to the rigid surfaces themselves, not to their half-spaces; at most `range_m`.

@@ -84,7 +84,7 @@ class Errors {
  private:
   ForceError error_;
   std::vector<double> errors_N_, jnds_;
-  // longest time still; longest time still with an error beyond 1 JND
+  // The longest time still, and the longest time still at which the error was beyond 1 JND.
   double longest_s_ = 0.0, beyond_s_ = 0.0;
 };
 

@@ -22,9 +22,11 @@ struct ObjectPair {
 
 struct PairForce {
   ObjectPair pair;
-  // Force of the other object on the soft one (scene's frame). Empty where the state does not determine it.
-  // That is so in three cases. Links at their limits tie the other object and a third one to the same voxels.
-  // Such links carry loads in tissue whose forces do not balance. Or an object has rigid blocks.
+  // Force of the other object on the soft one (scene's frame). It is empty in three cases, in which the state
+  // does not determine it:
+  // - links at their limits tie both the other object and a third one to the same voxels;
+  // - such links carry loads, and the forces on the tissue do not balance;
+  // - an object has rigid blocks.
   std::optional<glm::dvec3> on_soft_N;
   bool through_limits = false;  // links at their limits may carry a part of it
 };
@@ -50,7 +52,7 @@ struct PairCourse {
   ObjectPair pair;
   double max_N = 0.0, max_t_s = 0.0;
   std::optional<glm::dvec3> end_on_soft_N{};  // at the last sample; 0 if the pair does not touch then
-  // samples in which the pair touches; those of them with a known force
+  // Samples in which the pair touches, and those of them with a known force.
   std::uint64_t samples = 0, known_samples = 0;
 };
 

@@ -51,7 +51,7 @@ class Player {
   static constexpr double kMostRecorded_s = 1800.0;
   // Edits that may wait for the next tick, and edits that a whole session may apply.
   static constexpr std::size_t kEditsWaiting = 256, kMostEdits = 100'000;
-  // ticks whose figures may wait for a frame: eight seconds at 1 kHz
+  // Ticks whose figures may wait for a frame: eight seconds at 1 kHz.
   static constexpr std::size_t kSamples = 8192;
 
   // Starts the proxy, or throws SceneError. `real_device`: null for the scene's simulated device. Keeps

@@ -14,7 +14,7 @@ namespace hybrid {
 
 struct Recording {
   std::filesystem::path scene_file;  // the scene's file at the time of recording; replay reads it again
-  // text of that file at the time of recording, so that a change is noticed
+  // Text of that file at the time of recording, so that a change is noticed.
   std::string scene_text;
   double dt_s = 1e-3;
   device::DeviceLimits device{};  // limits of the device that was used

@@ -14,11 +14,11 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kPlaces = 4;  // places of contact that are measured
-// time that the hand moves in free space before it reaches the object
+// Time in which the hand moves in free space before it reaches the object.
 constexpr double kBefore_s = 0.05;
 constexpr double kSample_s = 0.25;  // measured time at each place
 constexpr double kLook_s = 1e-3;    // time between two samples of the path
-// samples of the path at most; a longer path is sampled more coarsely
+// Samples of the path at most. A longer path is sampled more coarsely.
 constexpr double kMostLooks = 200'000.0;
 
 // The part of a path from `from_s` on.

@@ -12,7 +12,7 @@ namespace hybrid {
 struct SceneCost {
   double load_s = 0.0;
   std::uint64_t held_bytes = 0;  // memory of the program once the scene is loaded
-  // estimated memory of the soft objects once they have been touched everywhere
+  // Estimated memory of the soft objects once they have been touched everywhere.
   std::uint64_t touched_bytes = 0;
   int places = 0;                      // places of contact along the path at which ticks were measured
   std::uint64_t ticks = 0;             // measured ticks in contact

@@ -24,10 +24,9 @@ struct EditedText {
 };
 
 // Returns the text with every value that differs from the scene's. A key that the scene lacks is added below
-// the header of its table. Two kinds of values are left as they are. Values of objects that are not [[rigid]]
-// tables with a name are one. Stiffness factors of tissue are the other, because objects may share a
-// material. `unit_m`: length unit of the scene's numbers. `file` is used in messages. Throws SceneError if
-// `text` is no TOML.
+// the header of its table. Not written are values of objects that are no [[rigid]] table with a name. Nor are
+// stiffness factors of tissue, because objects may share a material. `unit_m`: length unit of the scene's
+// numbers. `file` is used in messages. Throws SceneError if `text` is no TOML.
 [[nodiscard]] EditedText write_values(const std::string& text, const std::filesystem::path& file,
                                       double unit_m, std::span<const ValueInScene> values);
 

@@ -48,7 +48,7 @@ struct SessionOptions {
   // outside all rigid objects. Null: the scene's simulated device.
   device::HapticDevice* real_device = nullptr;
   bool keep_rows = true;  // trace rows and per-object forces
-  // keep every input, 48 bytes a tick; memory is constant without it and the rows
+  // Keep every input (48 bytes a tick). With neither inputs nor rows, memory does not grow.
   bool keep_recording = true;
   bool keep_clearance = false;  // keep distances between objects, at about a thousand moments
   // The forces between objects are computed at so many moments at most, evenly spread, and at the end. In
@@ -66,7 +66,7 @@ struct SessionOptions {
   // Relax tissue away from the contact asynchronously. In real time a thread of its own does so.
   bool async_relaxation = false;
   bool relaxation_thread = true;  // false: submitted states are never relaxed; for benchmarks
-  // how often the relaxation thread publishes surfaces for drawing
+  // How often the relaxation thread publishes surfaces for drawing.
   double surfaces_hz = 0.0;
   BlackBox* black_box = nullptr;               // every tick is added to it
   std::shared_ptr<const device::Path> path{};  // path of the hand; null: the scene's path
@@ -99,7 +99,7 @@ struct SessionResult {
   std::vector<std::string> device_messages;  // events of the device, each with its remedy
   std::vector<std::string> path_notes;       // findings of the path's reader: gaps, repeated times
   std::string realtime_note;                 // the priority that was granted, in words
-  // how late the machine woke the loop; not part of the tick's time
+  // How late the machine woke the loop. This is no part of the tick's time.
   Percentiles late_us;
   // CPU time of the ticks, and of asynchronous relaxation. In real time the latter is that of the relaxation
   // thread, otherwise that of the work that such a thread would have done.

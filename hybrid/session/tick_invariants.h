@@ -50,11 +50,11 @@ class TickInvariants {
   // Excess over the limits (N); 0 if within them.
   [[nodiscard]] double over_force_N() const { return over_force_N_; }
   [[nodiscard]] double over_slew_N() const { return over_slew_N_; }
-  // The largest excess of given plus stored energy over the allowed energy (J). Its bound is for rounding and
-  // for kTissueShare.
+  // The largest excess of given plus stored energy over the allowed energy (J), and its bound. The bound is
+  // for rounding and, with tissue, for kTissueShare.
   [[nodiscard]] double excess_J() const { return excess_J_; }
   [[nodiscard]] double tolerance_J() const;
-  // work in either direction plus the coupling's stored energy, summed over the ticks
+  // Sum over the ticks of the absolute work and of the coupling's stored energy.
   [[nodiscard]] double moved_J() const { return moved_J_; }
   [[nodiscard]] double given_J() const { return given_J_; }  // work on the hand, by the end
   // The largest value of given_J() so far, and the largest work of a single tick. They serve to compare runs

@@ -108,7 +108,7 @@ double envelope_growth(PressedScene& scene, const LoopSetting& setting, double s
   HeldLoop loop(scene, setting, stiffness_N_per_m, press_for(scene, stiffness_N_per_m));
   const double rest = loop.rest_depth_m();
   loop.settle();
-  // Rad/s; angular frequency without damping.
+  // Angular frequency without damping (rad/s).
   const double pace = std::sqrt(stiffness_N_per_m / held_loop(setting).mass_kg);
   const double wall_damping = setting.wall_damping_N_s_per_m;
   const double uncut = 0.1 * kMostShare * stiffness_N_per_m * rest / (pace * wall_damping + 1e-9);

@@ -48,7 +48,7 @@ struct StabilityRow {
   // At the device's nominal stiffness; felt if above 1.
   std::optional<double> nominal_N_per_m, felt_at_nominal;
 
-  // B in theory; includes the hand's, except for passivity.
+  // Damping b in theory. It includes the hand's, except for passivity.
   [[nodiscard]] double damping_N_s_per_m() const;
   [[nodiscard]] std::optional<double> error() const;  // measured / theory − 1
 };

@@ -23,7 +23,7 @@ struct FuzzOptions {
 // punch.
 struct FuzzResult {
   std::string scene;
-  // Nonfinite: number of inputs that were held back.
+  // `nonfinite`: inputs that were held back.
   std::uint64_t ticks = 0, contact_ticks = 0, nonfinite = 0;
   std::uint32_t faults = 0;  // all FaultBit flags that were ever set
   std::uint64_t hash = 0;    // of all forces, and of the state at the end

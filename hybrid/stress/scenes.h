@@ -28,7 +28,7 @@ enum class BlockShape : std::uint8_t { block, sheet, voxel, large };
 struct SceneSetting {
   SceneKind kind = SceneKind::rigid;
   double unit_m = 1e-3;               // a voxel is two units
-  glm::dvec3 origin_m{0.0};           // middle of the scene's coordinates
+  glm::dvec3 origin_m{0.0};           // origin of the units: the middle of a BlockShape::block
   double stiffness_N_per_m = 1000.0;  // of the coupling
   double young_Pa = 8000.0;
   double stretch_min = 0.4, stretch_max = 1.6, shear = 0.6;

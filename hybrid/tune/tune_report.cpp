@@ -74,7 +74,7 @@ std::string doubt_about_error(const TuneResult& result) {
   return text;
 }
 
-// Begins a verdict that cannot be trusted, because the truth is too uncertain. Otherwise empty.
+// Text before a verdict that cannot be trusted, because the truth is too uncertain; otherwise empty.
 std::string truth_warning(const TuneResult& result) {
   if (!truth_hides_bound(result)) return {};
   return fmt::format(

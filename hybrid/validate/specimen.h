@@ -26,7 +26,8 @@ struct Specimen {
   // limit.
   std::vector<double> young_Pa{1.0};
   std::function<std::uint8_t(const glm::dvec3&)> label{};  // label at a position; empty: 1 everywhere
-  // true: the base slips on a plate, and one voxel in its middle is held. False: it is bonded to the plate.
+  // If true, the base slips on a plate, and one voxel in its middle is held. If false, it is bonded to the
+  // plate.
   bool slipping_base = false;
 };
 

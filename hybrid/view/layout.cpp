@@ -7,7 +7,7 @@
 namespace hybrid {
 namespace {
 
-// Lengths are in heights of body text (em), shares have no unit.
+// Lengths are in heights of body text (em).
 constexpr float kHeading = 4.4F;
 constexpr float kHelp = 1.9F;
 constexpr float kColumn = 25.0F;

@@ -45,8 +45,8 @@ void TickHistory::add(const TickSample& sample) {
 std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series, std::size_t count) const {
   std::vector<std::optional<ColumnRange>> columns(count);
   if (count == 0) return columns;
-  // The limits of columns are fixed in time and do not move with the newest tick. So a spike stays in its
-  // column.
+  // Columns begin at whole multiples of step_s, not relative to the newest tick. So the ticks of a column
+  // stay together while the chart scrolls, and a spike does not flicker.
   const double step_s = seconds_ / static_cast<double>(count);
   const auto last = static_cast<std::int64_t>(std::floor(end_s() / step_s));
   for (const TickSample& sample : samples_) {
