@@ -254,8 +254,8 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   if (form && !holds_along(*form, scene.tool, result.models.front().rows, poses)) form.reset();
   if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows, poses));
 
-  // A closed form is the reference where it is exact or nearly so. Otherwise it is the model as which the
-  // scene has the object.
+  // The reference is the closed form where it is exact or nearly so. Otherwise it is the model with which the
+  // scene itself renders the object.
   const bool by_form = form && form->caveat.find("left out") == std::string::npos;
   result.reference = by_form ? result.models.size() - 1 : (is_soft && !punch ? 1 : 0);
   result.reference_text =

@@ -17,9 +17,8 @@ namespace hybrid {
 struct ComposeOptions {
   std::vector<std::filesystem::path> inputs;  // meshes, volumes, DICOM folders; empty: a starter scene
   std::filesystem::path labels, names;        // a segmentation, and the table of its labels' names
-  std::vector<std::string> rigid,
-      // Names, patterns or numbers of labels; empty: the table of tissues decides.
-      soft;
+  // Names, patterns or numbers of labels. Empty: the table of tissues decides.
+  std::vector<std::string> rigid, soft;
   std::vector<std::string> place;              // NAME=x,y,z[,rx,ry,rz] (mm, degrees)
   std::optional<std::array<double, 2>> range;  // intensities that are tissue, in volumes without labels
   std::optional<double> spacing_m;             // spacing of tissue

@@ -21,7 +21,7 @@ struct LabelRow {
 // ComposeError that names the line.
 [[nodiscard]] std::vector<LabelRow> label_rows(std::string_view text, const std::string& file);
 
-// The whole number in `text`. Accepts "5", and also "5.0", which programs write that store all numbers as
+// The whole number in `text`. Accepts "5" and also "5.0", because some programs store all numbers as
 // decimals.
 [[nodiscard]] std::optional<long long> whole_number_of(std::string_view text);
 

@@ -29,8 +29,8 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
 namespace {
 
 // Do the anchors carry the felt force of each object that only the tool presses? Standing still does not
-// prove equilibrium. Far from rest, with active limits all around a deep push, nothing may move from one
-// cycle to the next although half of the load has not reached the anchors, or is not felt.
+// prove equilibrium. In a deep push with active limits all around, nothing may move from one cycle to the
+// next. Yet half of the load may not have reached the anchors, or may not be felt.
 bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
   constexpr double kShare = 0.01, kLeast_N = 1e-3;
   if (!world.soft_pairs.empty()) return true;

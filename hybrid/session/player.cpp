@@ -15,7 +15,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kHandSpeed_m_per_s = 0.5;  // a brisk hand; the mouse is faster
+constexpr double kHandSpeed_m_per_s = 0.5;  // speed of a brisk hand; a mouse could be faster
 
 TickSample sample_of(const TickResult& felt, double t_s, double late_s, double dt_s) noexcept {
   return {.t_s = t_s,

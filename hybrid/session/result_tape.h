@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// All results of asynchronous relaxation in a session. Replayed from the tape, the session's ticks are the
-// same to the last bit, whatever the other cores do meanwhile.
+// All results of asynchronous relaxation in a session. With the results of this tape, the ticks of a replayed
+// session are the same to the last bit, whatever the other cores do meanwhile.
 #pragma once
 
 #include <cstddef>

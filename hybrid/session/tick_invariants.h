@@ -21,15 +21,16 @@ namespace hybrid {
 // texture. The hand may get the energy that coupling and tissue store when the checks begin. Let U(x) be the
 // least energy of coupling and tissue that the proxy can reach when the device is at x. The proxy can stay
 // where it was in the tick before, so for any surface the new energy is at most
-//     U' <= ½K|x' − q|² = U − F·(x' − x) + ½K|x' − x|²,    F = K (q − x) the force,
-// So the work F·(x' − x) of the held force on the hand is at most the stored energy plus ½K|Δx|² in each
-// tick. The term ½K|Δx|² is the cost of holding a force for a tick (Colgate & Schenkel 1997, K·T/2). An
-// engine that adds no energy stays within the bound, stable or not: with a coupling that is too stiff for the
-// loop, this term alone can feed a buzz. With the clamp the same holds for the energy of the clamped spring.
-// A slew limit delays a change ΔF of the force and may give |ΔF|·|Δx| more. This is added to the allowed
-// energy, and is zero where the limit did not act. Tissue is not solved to equilibrium within a tick. A wave
-// may store energy in it that the hand has not paid for, and return it. So with tissue, kTissueShare of
-// moved_J() is allowed besides. That bounds this engine's error and is no theorem.
+//     U' <= ½K|x' − q|² = U − F·(x' − x) + ½K|x' − x|²,
+// where F = K (q − x) is the force. So the work F·(x' − x) of the held force on the hand is at most the
+// stored energy plus ½K|Δx|² in each tick. The term ½K|Δx|² is the cost of holding a force for a tick
+// (Colgate & Schenkel 1997, K·T/2). An engine that adds no energy stays within the bound, stable or not: with
+// a coupling that is too stiff for the loop, this term alone can feed a buzz. With the clamp the same holds
+// for the energy of the clamped spring. A slew limit delays a change ΔF of the force and may give |ΔF|·|Δx|
+// more. This is added to the allowed energy, and is zero where the limit did not act. Tissue is not solved to
+// equilibrium within a tick. A wave may store energy in it that the hand has not paid for, and return it. So
+// with tissue, kTissueShare of moved_J() is allowed besides. That bounds this engine's error and is no
+// theorem.
 //
 // outside. The proxy's centre is no nearer to a rigid object than the proxy's radius, within rounding.
 class TickInvariants {

@@ -35,10 +35,10 @@ struct FuzzResult {
 
 // Runs episodes of 1,000 ticks. Positions: a walk over the surfaces in steps of 1e-9 to 1e-2 m, jumps of a
 // metre, NaN, infinities, denormals, and magnitudes of 1e-300 to 1e300. Velocities likewise. dt: 0.1 to 10
-// ms, stalls of up to 100 ms, 0, negative, NaN, infinite. TickInvariants checks each tick. Always: finite,
-// and within the limits. Where they are defined: outside rigid objects, and within the account of energy.
-// After each episode the tool is led away, and everything must come to rest without force. Throws
-// std::runtime_error if there is no folder for temporary files.
+// ms, stalls of up to 100 ms, 0, negative, NaN, infinite. TickInvariants checks each tick. All values
+// must be finite and within the limits. Where this is defined, the tool must be outside rigid objects, and
+// the energy within its account. After each episode the tool is led away, and everything must come to rest
+// without force. Throws std::runtime_error if there is no folder for temporary files.
 std::vector<FuzzResult> fuzz_ticks(const FuzzOptions& options);
 
 }  // namespace hybrid

@@ -58,7 +58,8 @@ ForceCourse slow_course(const TruthPlan& plan, const Setting& setting, const Mot
 Truth measure_truth(const TruthPlan& plan, const Motion& motion, const EvaluationCache& cache,
                     const Step& step);
 
-// Weight of a session, by the scale of its spacing. slow_weight(): of a slow run.
+// Relative cost of a session whose spacing is `scale` times the scene's own. slow_weight(): that of a slow
+// run.
 double play_weight(double scale);
 double slow_weight(double scale, int slower);
 

@@ -31,7 +31,7 @@ class ForceCurve {
       steady_.push_back(block.on_ball_N(1.0, depth) / std::pow(depth, 1.5));
     }
   }
-  // Interpolates the force without Hertz's power, because the rest varies slowly.
+  // Interpolates force / depth^1.5, which varies slowly: Hertz's power of the depth is divided out.
   [[nodiscard]] double at(double depth) const {
     if (!(depth > 0.0)) return 0.0;
     const auto above = std::ranges::upper_bound(depth_, depth);
@@ -63,8 +63,8 @@ Fit fit_modulus(const ForceCurve& curve, const ProbedTissue& tissue, double offs
   return {.scale_N = at_depth(tissue, kFitDepth_m).median_N / shape, .offset_m = offset_m};
 }
 
-// Fits E and the begin of contact to the first two depths. The contact may have begun before depth 0 ("light
-// contact").
+// Fits E and the start of the contact to the first two depths. The contact may have begun before depth 0
+// ("light contact").
 Fit fit_modulus_and_contact(const ForceCurve& curve, const ProbedTissue& tissue) {
   const double first_N = at_depth(tissue, kFirstDepth_m).median_N;
   double low_m = -0.4e-3, high_m = 2e-3;

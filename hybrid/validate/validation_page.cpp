@@ -94,8 +94,8 @@ std::string spread_text(const ValidationRow& row) {
   return row.low && row.high ? fmt::format("{:.4g} to {:.4g}", *row.low, *row.high) : "–";
 }
 
-// Rows of the groups. There is a column of spreads only if a row has one, and a column of sources only if
-// there are several sources.
+// A table of the groups' rows. There is a column of spreads only if a row has one, and a column of sources
+// only if there are several sources.
 PageTable table_of(const ValidationReport& report, const std::vector<std::string>& groups,
                    const std::string& name, const std::string& caption) {
   const bool with_sources = one_source(report, groups).empty();

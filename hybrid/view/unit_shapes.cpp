@@ -36,7 +36,7 @@ void set_shared_normals(DrawMesh& draw) {
     const glm::vec3 u = b.position - a.position;
     const glm::vec3 v = c.position - a.position;
     const float size = std::max(std::max(glm::length(u), glm::length(v)), 1e-30F);
-    // The weight is area over longest edge: its exponent stays small.
+    // The weight is the area over the longest edge. Its exponent stays small.
     const glm::vec3 normal = glm::cross(u / size, v / size) * size;
     a.normal += normal;
     b.normal += normal;

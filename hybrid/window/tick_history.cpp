@@ -46,7 +46,7 @@ std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series,
   std::vector<std::optional<ColumnRange>> columns(count);
   if (count == 0) return columns;
   // Columns begin at whole multiples of step_s, not relative to the newest tick. So the ticks of a column
-  // stay together while the chart scrolls, and a spike does not flicker.
+  // stay together while the chart scrolls.
   const double step_s = seconds_ / static_cast<double>(count);
   const auto last = static_cast<std::int64_t>(std::floor(end_s() / step_s));
   for (const TickSample& sample : samples_) {

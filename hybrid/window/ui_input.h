@@ -43,7 +43,7 @@ struct UiInput {
   bool control = false, shift = false, alt = false;
   std::u32string typed{};     // characters since the last frame
   float dt_s = 1.0F / 60.0F;  // time since the last frame
-  bool by_keyboard = false;   // the keyboard has the focus of the panels' controls
+  bool by_keyboard = false;   // keys move between the panels' controls and operate them
   // Buttons and keys that were let go in this frame. They count as held until its end, so that a short press
   // is not lost in slow frames.
   std::array<bool, 3> lifted_buttons{};
