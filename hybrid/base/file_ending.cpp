@@ -10,7 +10,7 @@ namespace hybrid {
 namespace {
 
 constexpr std::array<std::string_view, 4> kMeshEndings{".obj", ".ply", ".stl", ".off"};
-// Of formats that the program reads or writes.
+// Endings of the formats that the program reads or writes.
 constexpr std::array<std::string_view, 18> kKnownEndings{".toml", ".json", ".csv",  ".txt", ".traj", ".svg",
                                                          ".png",  ".obj",  ".ply",  ".stl", ".off",  ".gz",
                                                          ".nii",  ".nrrd", ".nhdr", ".mha", ".mhd",  ".dcm"};

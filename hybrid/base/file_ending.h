@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the ending of a file's name says about its format.
+// The format that the ending of a file's name stands for.
 #pragma once
 
 #include <filesystem>
@@ -9,19 +9,19 @@
 
 namespace hybrid {
 
-// The ending in lower case, with its dot: ".toml" of "A.TOML"; empty where there is none.
+// The ending in lower case, with its dot: ".toml" for "A.TOML". Empty if there is none.
 std::string lower_ending(const std::filesystem::path& file);
 
-// Whether the name is that of a mesh: .obj, .ply, .stl or .off, each also with .gz.
+// Is it the name of a mesh: .obj, .ply, .stl or .off, each also with .gz?
 bool is_mesh_name(const std::filesystem::path& file);
 
-// Refuses an output whose ending names another format than those that are written: throws std::runtime_error
-// with `option`, `file` and the endings that work. A name without an ending, "-" and what is no ordinary file
-// (a pipe, /dev/stdout) have any format.
+// Refuses an output file whose ending stands for another format than `endings`: throws std::runtime_error
+// with `option`, `file` and the allowed endings. Some names have any format: a name without an ending, "-",
+// and anything that is no ordinary file (a pipe, /dev/stdout).
 void require_ending(std::string_view option, const std::filesystem::path& file,
                     std::initializer_list<std::string_view> endings);
 
-// The same for a file of a format that no other program knows: refuses endings of formats that others know.
+// For a file of the program's own format: refuses endings that stand for other formats.
 void require_ending_of_none(std::string_view option, const std::filesystem::path& file);
 
 }  // namespace hybrid

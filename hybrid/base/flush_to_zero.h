@@ -4,9 +4,9 @@
 
 namespace hybrid {
 
-// Flush-to-zero on the calling thread.
+// Switches flush-to-zero on for the calling thread.
 void set_flush_to_zero() noexcept;
-// The same for the lifetime of the object: for a thread that belongs to the driver.
+// Switches it on during the life of the object, for a thread that belongs to a driver.
 class ScopedFlushToZero {
  public:
   ScopedFlushToZero() noexcept;

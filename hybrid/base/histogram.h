@@ -14,8 +14,8 @@ struct Percentiles {
   double p50 = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
 };
 
-// Counts in bins of 1/64 of an octave, so that a percentile is within 0.8 % of the exact one; the maximum is
-// exact. A list of a day's ticks would take gigabytes.
+// Counts values in bins of 1/64 of an octave. So a percentile is within 0.8 % of the exact one, and the
+// maximum is exact. A list of a day's ticks at 1 kHz would take 0.7 GB.
 class LatencyHistogram {
  public:
   // Allocates nothing. Negative values and NaN count as 0.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Text by its characters, not its bytes.
+// Operations on text that count characters, not bytes.
 #pragma once
 
 #include <cstddef>

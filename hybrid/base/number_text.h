@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers as text with a decimal point, whatever the locale.
+// Numbers as text with a decimal point, independent of the locale.
 #pragma once
 
 #include <array>
@@ -16,12 +16,12 @@ inline std::string number_text(double value, std::chars_format format, int preci
 }
 }  // namespace detail
 
-// "1.250" with three decimals.
+// A number with so many decimals: "1.250" with three.
 inline std::string with_decimals(double value, int decimals) {
   return detail::number_text(value, std::chars_format::fixed, decimals);
 }
 
-// "1.25" with at most so many digits; very large and small ones as "1.25e+06".
+// A number with at most so many digits, for example "1.25". Very large and small numbers: "1.25e+06".
 inline std::string with_digits(double value, int digits) {
   return detail::number_text(value, std::chars_format::general, digits);
 }

@@ -10,7 +10,7 @@
 
 namespace hybrid {
 
-// A full queue refuses new values and counts them: the reader sees every value up to there, in order.
+// A full queue refuses new values and counts them. The reader sees all accepted values, in order.
 template <class T>
 class SpscRing {
  public:
@@ -39,14 +39,14 @@ class SpscRing {
     return true;
   }
 
-  // Values that were refused so far; for either side.
+  // Number of values that were refused so far. Either side may call it.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_.load(std::memory_order_relaxed); }
 
  private:
   [[nodiscard]] std::size_t after(std::size_t slot) const noexcept {
     return slot + 1 == slots_.size() ? 0 : slot + 1;
   }
-  std::vector<T> slots_;  // one stays empty: full differs from empty
+  std::vector<T> slots_;  // one slot stays empty, which tells a full queue from an empty one
   alignas(64) std::atomic<std::size_t> written_{0};
   alignas(64) std::atomic<std::size_t> read_{0};
   alignas(64) std::atomic<std::uint64_t> refused_{0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables in plain text, for terminals and logs. A column is stated once: its title, its width and the text of
+// Tables in plain text, for terminals and logs. A column has a title, a width and a function for the text of
 // a cell.
 #pragma once
 
@@ -20,15 +20,15 @@ template <class Row>
 class Table {
  public:
   struct Column {
-    std::array<std::string, 2> title;  // lines of the head; the second one may be empty
-    std::size_t width = 0;             // in letters, at least; a wider cell moves the rest of its line
+    std::array<std::string, 2> title;  // two lines of the head; the second may be empty
+    std::size_t width = 0;             // least width in characters; a wider cell shifts the rest of its line
     Side side = Side::right;
     std::function<std::string(const Row&)> cell;
   };
 
   explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-  // Ends in a line end, as line() does.
+  // The head. It ends with a line break, and so does line().
   [[nodiscard]] std::string head() const {
     const auto any = [this](std::size_t n) {
       return std::ranges::any_of(columns_, [n](const Column& c) { return !c.title[n].empty(); });
@@ -39,7 +39,7 @@ class Table {
     }
     return text;
   }
-  // `note`: follows the cells, as it is.
+  // The line of a row. `note` follows the cells unchanged.
   [[nodiscard]] std::string line(const Row& row, const std::string& note = {}) const {
     return joined([&row](const Column& c) { return c.cell(row); }, note);
   }
@@ -50,7 +50,7 @@ class Table {
       for (const Row& row : rows) c.width = std::max(c.width, letters(c.cell(row)));
     }
   }
-  // Head and lines, all columns as wide as they need.
+  // Head and lines. All columns are as wide as their contents need.
   [[nodiscard]] std::string text(std::span<const Row> rows) const {
     Table fitted = *this;
     fitted.fit(rows);

@@ -6,7 +6,7 @@
 
 namespace hybrid {
 
-// Since the thread began (s). Pre-emption does not count.
+// CPU time since the thread began (s). Time in which it was pre-empted does not count.
 [[nodiscard]] inline double thread_time_s() noexcept {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -8,8 +8,8 @@
 
 namespace hybrid {
 
-// The writer fills back() and publishes; the reader takes the latest value. Neither waits, and neither
-// allocates here (slots are reused with their capacity). It uses no std::atomic<std::shared_ptr>, which is
+// The writer fills back() and publishes it. The reader takes the latest value. Neither waits, and the slots
+// keep their capacity, so neither needs to allocate. std::atomic<std::shared_ptr> is not used, because it is
 // not always lock-free.
 template <class T>
 class TripleBuffer {
@@ -21,7 +21,7 @@ class TripleBuffer {
   }
 
   // ---- reader ----
-  // The latest published value; the previous one if there is none newer.
+  // The latest published value; the same as before if none is newer.
   [[nodiscard]] const T& take() noexcept {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) != 0) {
       front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;

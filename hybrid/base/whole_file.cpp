@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostLinks = 40;  // that one path leads over, as for the system itself
+constexpr int kMostLinks = 40;  // links in a row at most, as in the system itself
 constexpr std::string_view kOpenFiles = "/proc/self/fd/";
 
 [[noreturn]] void refuse_file(const fs::path& file, const std::string& why) {
@@ -28,7 +28,7 @@ constexpr std::string_view kOpenFiles = "/proc/self/fd/";
                            "); name a file in a folder that exists and that you may write to");
 }
 
-// The number of an open descriptor that the path names, as in -, /dev/stdout, /dev/fd/3 or /proc/self/fd/3.
+// The open descriptor that the path names, such as -, /dev/stdout, /dev/fd/3 or /proc/self/fd/3; −1 if none.
 int descriptor_of(const fs::path& path) {
   const std::string text = path.lexically_normal().string();
   if (text == "-" || text == "/dev/stdout") return STDOUT_FILENO;
@@ -84,7 +84,7 @@ FileOnItsWay::~FileOnItsWay() {
 }
 
 bool FileOnItsWay::open() noexcept {
-  constexpr mode_t kMode = 0666;  // less the umask
+  constexpr mode_t kMode = 0666;  // the umask is subtracted
   if (place_.descriptor >= 0) {
     descriptor_ = ::fcntl(place_.descriptor, F_DUPFD_CLOEXEC, 0);
     return descriptor_ >= 0;
@@ -95,9 +95,9 @@ bool FileOnItsWay::open() noexcept {
   }
   struct stat old {};
   const bool replaces = ::stat(place_.target.c_str(), &old) == 0;
-  if (replaces && ::access(place_.target.c_str(), W_OK) != 0) return false;  // protected by its owner
-  // A file without a name is gone with the process. Some file systems have none (NFS), and it gets its name
-  // by way of /proc.
+  if (replaces && ::access(place_.target.c_str(), W_OK) != 0) return false;  // the owner protects the file
+  // A file without a name vanishes with the process. keep() gives it a name by way of /proc. Some file
+  // systems (NFS) have no such files; then a temporary name is used.
   if (::access(kOpenFiles.data(), X_OK) == 0)
     descriptor_ = ::open(place_.folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, kMode);
   if (descriptor_ < 0) {
@@ -105,7 +105,7 @@ bool FileOnItsWay::open() noexcept {
     named_ = descriptor_ >= 0;
   }
   if (descriptor_ < 0) return false;
-  if (replaces) {  // owner and permissions stay, as far as that is allowed
+  if (replaces) {  // keep owner and permissions if that is allowed
     [[maybe_unused]] const int owned = ::fchown(descriptor_, old.st_uid, old.st_gid);
     [[maybe_unused]] const int allowed = ::fchmod(descriptor_, old.st_mode & 07777U);
   }
@@ -135,7 +135,7 @@ bool FileOnItsWay::keep() noexcept {
     return false;
   }
   named_ = false;
-  // The name is on the disk too. Not every file system can do that, and the file is there without it.
+  // Writes the new name to the disk too. Some file systems cannot do this; the file is there without it.
   const int folder = ::open(place_.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder >= 0) {
     ::fsync(folder);
@@ -191,7 +191,7 @@ void require_writable(const fs::path& file) {
   std::error_code error;
   if (file.has_parent_path()) fs::create_directories(file.parent_path(), error);
   const FilePlace place(file);
-  if (place.at_once) {  // opening a pipe would wait for its reader
+  if (place.at_once) {  // opening a pipe would wait for a reader
     if (place.descriptor < 0 && ::access(place.target.c_str(), W_OK) != 0)
       refuse_file(file, std::strerror(errno));
     return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Files that are written whole or not at all. The bytes go to a file without a name in the same folder, which
-// takes the place of the target once all is on the disk: a full disk or a kill leaves what was there.
+// Files that are written whole or not at all. The bytes go to a file without a name in the same folder. When
+// all are on the disk, it replaces the target. So a full disk or a kill leaves the old file as it was.
 #pragma once
 
 #include <cstddef>
@@ -11,27 +11,27 @@
 
 namespace hybrid {
 
-// Where the bytes for a path go. Links are followed, so that a link stays and its target is replaced. A
-// device, a named pipe or an open descriptor ("-" and /dev/stdout: standard output) has no other name to be
-// written under, and is written at once. Throws std::runtime_error in words: a folder, no folder to write
-// into.
+// The place to which the bytes for a path go. Links are followed: a link stays, and its target is replaced. A
+// device, a named pipe or an open descriptor ("-" and /dev/stdout: standard output) cannot be replaced and is
+// written directly. Throws std::runtime_error in words if the path is a folder, or if there is no folder to
+// write into.
 struct FilePlace {
   explicit FilePlace(const std::filesystem::path& file);
 
-  std::filesystem::path asked;  // as it was given, for messages
-  std::string target;           // the file itself, behind all links
+  std::filesystem::path asked;  // the path as it was given, for messages
+  std::string target;           // the file after all links
   std::string folder;           // of the target
-  std::string temporary;        // a name in the folder that nobody has
-  int descriptor = -1;          // of an open descriptor
-  bool at_once = false;         // no ordinary file
+  std::string temporary;        // an unused name in the folder
+  int descriptor = -1;          // if the path names an open descriptor; otherwise −1
+  bool at_once = false;         // true: no ordinary file, written directly
 };
 
-// One file on its way, without allocation: safe in a signal handler. Functions return false and leave errno
-// on failure.
+// A file that is being written, without allocation: safe in a signal handler. Functions return false on
+// failure and set errno.
 class FileOnItsWay {
  public:
   explicit FileOnItsWay(const FilePlace& place) noexcept : place_(place) {}
-  ~FileOnItsWay();  // what was not kept is gone
+  ~FileOnItsWay();  // removes a file that was not kept
   FileOnItsWay(const FileOnItsWay&) = delete;
   FileOnItsWay& operator=(const FileOnItsWay&) = delete;
   FileOnItsWay(FileOnItsWay&&) = delete;
@@ -40,7 +40,7 @@ class FileOnItsWay {
   bool open() noexcept;
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
   bool keep() noexcept;
-  // After a keep() that failed: all bytes are in FilePlace::temporary, and stay there.
+  // Returns true after a failed keep(): all bytes are in FilePlace::temporary, which stays.
   [[nodiscard]] bool left_beside() const noexcept { return left_beside_; }
 
  private:
@@ -49,7 +49,7 @@ class FileOnItsWay {
   bool named_ = false, left_beside_ = false;
 };
 
-// The same as a stream. Each member throws std::runtime_error with file, reason and remedy.
+// A whole file with a stream. Each member throws std::runtime_error with file, reason and remedy.
 class WholeFile {
  public:
   explicit WholeFile(const std::filesystem::path& file);
@@ -61,9 +61,9 @@ class WholeFile {
 
   void write(const void* bytes, std::size_t count);
   void write(std::string_view text) { write(text.data(), text.size()); }
-  // For libraries that write themselves; their errors are found by keep().
+  // For libraries that write to a stream. keep() finds their errors.
   [[nodiscard]] std::FILE* stream() { return stream_; }
-  // The file is complete: it takes its place.
+  // Call when the file is complete. It then replaces the target.
   void keep();
 
  private:
@@ -74,11 +74,11 @@ class WholeFile {
   std::FILE* stream_ = nullptr;
 };
 
-// Text as a whole file.
+// Writes a text as a whole file.
 void save_text(const std::filesystem::path& file, std::string_view text);
 
-// Makes the folders of the file where they are missing, and throws as WholeFile does if no file can be
-// written there. Leaves no file.
+// Makes missing folders of the file's path. Throws as WholeFile does if no file can be written there. Leaves
+// no file.
 void require_writable(const std::filesystem::path& file);
 
 }  // namespace hybrid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Figure 22: relaxation that oscillates and relaxation that settles, as SVG.
+// The thesis's Figure 22 as SVG: relaxation that oscillates, and relaxation that settles.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 namespace hybrid {
 
-// Throws std::runtime_error: file not writable.
+// Throws std::runtime_error if the file is not writable.
 void save_settling_plot(const std::filesystem::path& svg, const std::vector<bench::SettlingObject>& objects);
 
 }  // namespace hybrid

@@ -20,13 +20,15 @@ namespace hybrid::bench {
 namespace {
 
 constexpr double kTick = 1e-3;
-constexpr int kWide = 36, kHigh = 20;  // voxels of a block; a ball is as wide
-constexpr double kYoung = 1e5;         // Pa: forces of newtons, so that a JND is a share of them
-constexpr double kAway = 0.5;          // spacings above the surface, where strokes begin and end
-constexpr double kTolerance = 1e-4;    // of the lattice's force scale: a reference is at rest
+constexpr int kWide = 36, kHigh = 20;  // voxels of a block; a ball has the same width
+// Pa; forces are some newtons, so a JND is a share of them rather than the floor.
+constexpr double kYoung = 1e5;
+constexpr double kAway = 0.5;  // spacings above the surface at which strokes begin and end
+// Share of the lattice's force scale; a reference with a smaller residual is at rest.
+constexpr double kTolerance = 1e-4;
 constexpr int kMostSettleCycles = 60;
 
-// Device positions, a tick apart.
+// Visits the device positions along the corners, one for each tick.
 template <class Visit>
 void along(const std::vector<glm::dvec3>& corners, double speed, const Visit& visit) {
   for (std::size_t n = 1; n < corners.size(); ++n) {
@@ -37,12 +39,12 @@ void along(const std::vector<glm::dvec3>& corners, double speed, const Visit& vi
   }
 }
 
-// The same object elsewhere, brought to rest with the tool at each place.
+// A copy of the object, which is brought to rest with the tool at each place.
 class Equilibrium {
  public:
   Equilibrium(const World& world, const WorldState& state) : world_(world), object_(state.soft[0]->copy()) {}
 
-  // Force on the tool at `point`, both in scene frame (N).
+  // Force on the tool at `point` (N). Both are in the scene's frame.
   glm::dvec3 at(const glm::dvec3& point) {
     const SoftBody& body = world_.soft[0];
     const voxel::ToolInBody tool = tool_in_body(world_, body, point);
@@ -64,7 +66,7 @@ class Equilibrium {
   std::vector<voxel::VoxelId> near_;
 };
 
-// Out of the surface, where the stroke begins.
+// Normal of the surface where the stroke begins.
 glm::dvec3 outwards(Smooth block) {
   return block == Smooth::oblique ? glm::normalize(glm::dvec3(0.8, 0.35, 1.0)) : glm::dvec3(0.0, 0.0, 1.0);
 }
@@ -99,7 +101,7 @@ Scene stroke_scene(const StrokeCase& stroke) {
   Anchors anchors;
   std::map<std::uint8_t, std::string> materials;
   if (stroke.block == Smooth::layered) {
-    // Skin, fat and muscle: soft between firm, the top layer three voxels thick.
+    // Skin, fat and muscle: soft between firm. The top layer is three voxels thick.
     formula.layers = {{0.5 * kHigh * kSoftSpacing_m, 2}, {(0.5 * kHigh - 3.0) * kSoftSpacing_m, 1}};
     formula.label = 2;
     materials[2] = "firm";
@@ -125,7 +127,7 @@ std::vector<glm::dvec3> stroke_corners(const StrokeCase& stroke) {
   const glm::dvec3 n = outwards(stroke.block);
   const double surface = 0.5 * (stroke.block == Smooth::oblique ? kWide : kHigh) * kSoftSpacing_m;
   const double touched = surface + stroke.radius_spacings * kSoftSpacing_m;
-  // Off the lattice in every direction.
+  // The stroke must not run along the lattice in any direction.
   const glm::dvec3 side = glm::normalize(glm::cross(n, glm::dvec3(0.3, 1.0, 0.2))),
                    other = glm::cross(n, side);
   const glm::dvec3 start = touched * n - 0.5 * stroke.slide_spacings * kSoftSpacing_m * side +

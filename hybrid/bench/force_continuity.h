@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How smooth tissue feels: along a stroke, how much larger a tick's step of force is than that of the
-// equilibrium at the same places of the tool, and what work the tissue does over a closed path.
+// Smoothness of the tissue's force along a stroke. The step of a tick's force is compared with that of the
+// equilibrium at the same places of the tool. The work of the tissue over a closed path is measured too.
 #pragma once
 
 #include <cstdint>
@@ -15,37 +15,39 @@ namespace hybrid::bench {
 enum class Smooth : std::uint8_t { homogeneous, layered, oblique };
 const char* smooth_name(Smooth block);
 
-// A ball on a block of 1 mm voxels, or on the side of a ball of them, where no layer lies along the surface.
+// The tool, a ball, strokes a block of 1 mm voxels, or the side of a ball of such voxels. In the latter no
+// layer of voxels lies along the surface.
 struct StrokeCase {
   Smooth block = Smooth::homogeneous;
   double radius_spacings = 4.0;
   double depth_spacings = 2.0;
   double speed_m_per_s = 0.03;
-  double slide_spacings = 0.0;  // at full depth; 0: pressed and lifted
+  double slide_spacings = 0.0;  // length of the slide at full depth; 0: only pressed and lifted
 };
 
-// The scene of it, without a path.
+// The scene of a stroke, without a path.
 Scene stroke_scene(const StrokeCase& stroke);
-// Where the device goes: corners in scene frame (m), the first and the last in free space.
+// Corners of the device's path in the scene's frame (m). The first and the last are in free space.
 std::vector<glm::dvec3> stroke_corners(const StrokeCase& stroke);
 
 struct StrokeResult {
   std::uint64_t ticks = 0;  // in contact
-  // The steps that a tick's force takes beyond those of the equilibrium, in JND of the equilibrium's force.
+  // How much larger the steps of the tick's force are than those of the equilibrium. Unit: JND of the
+  // equilibrium's force.
   double excess_p50_jnd = 0.0, excess_p99_jnd = 0.0, excess_max_jnd = 0.0, excess_max_N = 0.0;
-  double excess_at_tick = 0.0;  // where the largest is
-  double error_max_jnd = 0.0;   // of the force itself
+  double excess_at_tick = 0.0;  // tick with the largest excess
+  double error_max_jnd = 0.0;   // error of the force itself
   double force_max_N = 0.0;
-  double unsettled_share = 0.0;  // of the equilibria, not within the tolerance
+  double unsettled_share = 0.0;  // share of the equilibria that were not within the tolerance
 };
 
-// Ticks along straight lines through `corners` at a speed; beside them, a copy of the object at equilibrium
-// with the tool where the proxy is.
+// Plays ticks along straight lines through `corners`. For each tick a copy of the object is brought to rest,
+// with the tool at the proxy's place.
 StrokeResult measure_stroke(const Scene& scene, const std::vector<glm::dvec3>& corners, double speed_m_per_s);
 
-// The same without a reference: the work that the force on the device does along the way (J), by the
-// trapezoidal rule: the force held for a tick while the hand goes on puts out K·v²·T a second of its own,
-// which is the sampling's and not the tissue's (device/README.md).
+// Work of the force on the device along the path (J), by the trapezoidal rule; no reference is computed. The
+// rule excludes the work of sampling: a force that is held for a tick while the hand moves on puts out K·v²·T
+// a second (device/README.md).
 double work_of_stroke(const Scene& scene, const std::vector<glm::dvec3>& corners, double speed_m_per_s);
 
 }  // namespace hybrid::bench

@@ -57,7 +57,8 @@ Name parse(const std::string& name) {
                   name));
 }
 
-// Numbers the vertices of a divided icosahedron: its corners, those along its edges, those inside its faces.
+// Numbers the vertices of a divided icosahedron: its corners, the vertices along its edges, and those inside
+// its faces.
 class Geodesic {
  public:
   Geodesic(const polygon::TriangleMesh& base, int frequency, double radius)
@@ -79,7 +80,7 @@ class Geodesic {
     return static_cast<std::uint32_t>(mesh_.vertices.size() - 1);
   }
 
-  // The i-th vertex on the way from corner a to corner b; both faces at that edge get the same ones.
+  // The i-th vertex on the way from corner a to corner b. Both faces at the edge get the same vertices.
   std::uint32_t on_edge(std::uint32_t a, std::uint32_t b, int i) {
     if (i == 0) return a;
     if (i == f_) return b;
@@ -96,7 +97,7 @@ class Geodesic {
     return place->second + static_cast<std::uint32_t>(i - 1);
   }
 
-  // Row i of a face has f − i + 1 vertices, from the side a–c to the side b–c, at height i towards c.
+  // Row i of a face, at height i towards c. It has f − i + 1 vertices, from side a–c to side b–c.
   std::vector<std::uint32_t> row(const polygon::TriangleIndices& face, int i) {
     const auto [a, b, c] = face;
     std::vector<std::uint32_t> indices;
@@ -133,7 +134,8 @@ class Geodesic {
   int f_;
   double radius_;
   polygon::TriangleMesh mesh_;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> edges_;  // corners to the first between
+  // Two corners, and the first vertex between them.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> edges_;
 };
 
 double inscribed_radius(const polygon::TriangleMesh& mesh) {
@@ -156,7 +158,7 @@ polygon::TriangleMesh make_geodesic_mesh(double radius_m, int frequency) {
 polygon::TriangleMesh make_corner_mesh(double size_m, int quads_per_edge) {
   const auto n = static_cast<std::uint32_t>(quads_per_edge);
   polygon::TriangleMesh mesh;
-  std::map<std::array<std::uint32_t, 3>, std::uint32_t> seams;  // vertices on an axis belong to two planes
+  std::map<std::array<std::uint32_t, 3>, std::uint32_t> seams;  // a vertex on an axis belongs to two planes
   const auto vertex = [&](const std::array<std::uint32_t, 3>& at) {
     const auto make = [&] {
       mesh.vertices.push_back(glm::dvec3(at[0], at[1], at[2]) / static_cast<double>(n) * size_m);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The meshes that `hybrid bench rigid` touches: by name, from a thousand triangles to ten million and more,
-// or from a file.
+// The meshes of `hybrid bench rigid`: named ones, from a thousand triangles to more than ten million, or one
+// from a file.
 #pragma once
 
 #include <cstdint>
@@ -17,32 +17,33 @@ enum class BenchShape : std::uint8_t { sphere, cube, corner, from_file };
 struct BenchMesh {
   std::string name;
   BenchShape shape = BenchShape::sphere;
-  bool solid = true;                // closed: it has an inside
-  double inscribed_radius_m = 0.0;  // sphere and cube: least distance of a triangle's plane to the middle
-  double reach_m = 0.0;             // from_file: greatest distance of a vertex to the middle of the box
-  polygon::TriangleMesh mesh;       // counter-clockwise seen from outside, each vertex once
+  bool solid = true;                // true: a closed mesh with an inside
+  double inscribed_radius_m = 0.0;  // sphere and cube: least distance from a triangle's plane to the middle
+  double reach_m = 0.0;             // from_file: greatest distance from a vertex to the middle of the box
+  polygon::TriangleMesh mesh;       // counter-clockwise as seen from outside; each vertex occurs once
 };
 
-// ico0 … ico9    a unit icosahedron with every triangle cut into four that often: 20·4ⁿ triangles
-// geo1 … geo1024 its faces cut into n² triangles each (707: 9,996,980), for sizes between and beyond
-// cube1 … cube1024, corner1 … corner1024: a cube, and three quarter planes that meet, of n quads an edge
+// ico0 … ico9: a unit icosahedron whose triangles are cut into four n times: 20·4ⁿ triangles.
+// geo1 … geo1024: its faces are cut into n² triangles each (707: 9,996,980), for sizes between and beyond.
+// cube1 … cube1024, corner1 … corner1024: a cube, and three quarter planes that meet, with n quads an edge.
 // Every vertex of a ball lies on the sphere of bench::kSphereRadius_m. All sizes are multiplied by `scale`.
-// Throws std::invalid_argument that says which names there are.
+// Throws std::invalid_argument that lists the names.
 BenchMesh make_bench_mesh(const std::string& name, double scale = 1.0);
 
-// What a name stands for, without making it; the same exception.
+// The shape that a name stands for, without making the mesh. Throws the same exception.
 BenchShape bench_mesh_shape(const std::string& name);
 std::size_t bench_mesh_triangles(const std::string& name);
 
-// Is this the path of a file, and no name of the list above? (It has a dot or a slash.)
+// Is this the path of a file and not one of the names above? A path has a dot or a slash.
 bool is_bench_mesh_file(std::string_view name);
-// The mesh of a file with the middle of its box at the origin. `notes`: its defects in words. Throws
+// Loads a mesh file and moves the middle of its box to the origin. `notes`: gets its defects in words. Throws
 // polygon::MeshError.
 BenchMesh load_bench_mesh(const std::string& file, double unit_m, std::vector<std::string>& notes);
 
-// The ball of geo<frequency>.
+// The ball of mesh geo<frequency>.
 polygon::TriangleMesh make_geodesic_mesh(double radius_m, int frequency);
-// The three quarter planes x = 0, y = 0, z = 0 over [0, size]², seen from where x, y and z are positive.
+// The three quarter planes x = 0, y = 0 and z = 0 over [0, size]². They face the side where x, y and z are
+// positive.
 polygon::TriangleMesh make_corner_mesh(double size_m, int quads_per_edge);
 
 }  // namespace hybrid::bench

@@ -27,16 +27,17 @@ constexpr std::size_t kMostFound = 4096;
 constexpr std::size_t kMostBrute = 1'000'000, kMostTreeOfAll = 1'000'000;
 constexpr std::array<OccupancyPattern, 3> kPatterns{OccupancyPattern::empty, OccupancyPattern::coherent,
                                                     OccupancyPattern::random};
-constexpr std::array<int, 2> kBoxes{1, 5};  // cells along an edge: one cell; a tool's
+constexpr std::array<int, 2> kBoxes{1, 5};  // cells along an edge: one cell, or a tool's box
 
 struct QueryBox {
   glm::dvec3 low, high;
-  // What the map is asked: of one cell of voxels a point in it, which is the same question.
+  // The box that the map is asked for. For one cell of voxels it is a point in the cell, which gives the same
+  // answer.
   glm::dvec3 map_low, map_high;
 };
 using Found = std::array<std::uint32_t, kMostFound>;
 
-// Samples of one operation, each the mean over a batch.
+// Samples of one operation. Each is the mean over a batch.
 struct Samples {
   std::vector<double> ns;
   std::size_t batch = kBatch;
@@ -49,7 +50,7 @@ double share_of(std::vector<double>& values, double share) {
   return values[std::min(at, values.size() - 1)];
 }
 
-// One ball in all engines.
+// Measures one ball with all engines.
 class OccupancyBench {
  public:
   OccupancyBench(const OccupancyBenchOptions& options, OccupancyBall ball)
@@ -80,17 +81,18 @@ class OccupancyBench {
   void update_voxels(const std::function<void(OccupancyRow)>& add);
   void update_body(const std::function<void(OccupancyRow)>& add);
 
-  // Whole cells about a place: the same points lie in these for every engine.
+  // A box of whole cells about a place, so that it contains the same points for every engine.
   [[nodiscard]] QueryBox box_about(const glm::dvec3& p, int box_cells) const;
   [[nodiscard]] std::size_t ask(OccupancyEngine engine, const QueryBox& box, Found& out) const;
   [[nodiscard]] std::size_t ask_brute(const QueryBox& box, Found& out) const;
 
   const OccupancyBenchOptions& options_;
   OccupancyBall ball_;
-  BrickGrid index_;  // for its rounding
+  BrickGrid index_;  // rounds positions to cells
   TickTimer timer_;
   std::unique_ptr<OccupancyMap> map_;
-  mutable OccupancyMap::Trail trail_;  // as a tick asks; answers do not depend on it
+  // Kept from look-up to look-up, as in a tick; answers do not depend on it.
+  mutable OccupancyMap::Trail trail_;
   std::unique_ptr<polygon::BoxSearch> tree_;
   std::size_t cells_ = 0;
   Samples tree_build_;
@@ -161,7 +163,7 @@ void OccupancyBench::build(const std::function<void(OccupancyRow)>& add) {
 QueryBox OccupancyBench::box_about(const glm::dvec3& p, int box_cells) const {
   const CellCoordinates c = index_.cell_of(p);
   const double reach = 0.5 * (box_cells - 1);
-  // A hair within the cells' faces, where no voxel is.
+  // The box ends just inside the faces of cells, where no voxel is.
   const glm::dvec3 middle = ball_.cell_m * (glm::dvec3(c[0], c[1], c[2]) + 0.5),
                    half(ball_.cell_m * (reach + 0.5 - 1e-3));
   const QueryBox box{middle - half, middle + half, middle - half, middle + half};
@@ -182,7 +184,7 @@ std::size_t OccupancyBench::ask_brute(const QueryBox& box, Found& out) const {
 
 std::size_t OccupancyBench::ask(OccupancyEngine engine, const QueryBox& box, Found& out) const {
   if (engine == OccupancyEngine::brute) return ask_brute(box, out);
-  // Of triangles the map says whether there are any, and the tree ends with the first.
+  // For triangles the map only tells whether there are any, so the tree stops at the first.
   if (!voxels()) {
     if (engine == OccupancyEngine::map) return map_->rigid_in(box.map_low, box.map_high, trail_) != 0 ? 1 : 0;
     return tree_->in(box.low, box.high, std::span(out).first(1));
@@ -197,7 +199,7 @@ void OccupancyBench::check(OccupancyRow& r, std::span<const QueryBox> boxes) con
   const OccupancyEngine other = by_tree  ? OccupancyEngine::cgal_aabb
                                 : by_map ? OccupancyEngine::map
                                          : OccupancyEngine::brute;
-  if (other == OccupancyEngine::brute && !voxels()) return;  // asked for the map alone
+  if (other == OccupancyEngine::brute && !voxels()) return;  // no tree to compare the map with
   r.reference = engine_name(other);
   const std::size_t most = other == OccupancyEngine::brute ? 10 : options_.quick ? 200 : 2000;
   static thread_local Found mine, theirs;
@@ -208,7 +210,7 @@ void OccupancyBench::check(OccupancyRow& r, std::span<const QueryBox> boxes) con
     const std::span b(theirs.data(), ask(other, boxes[n], theirs));
     ++r.checked;
     found += a.size();
-    if (!voxels()) {  // the map reports what lies within a cell of the box
+    if (!voxels()) {  // the map also reports triangles within a cell of the box
       const bool of_map = r.engine == OccupancyEngine::map ? !a.empty() : !b.empty();
       const bool of_tree = r.engine == OccupancyEngine::map ? !b.empty() : !a.empty();
       r.missed += of_tree && !of_map ? 1 : 0;
@@ -237,7 +239,7 @@ void OccupancyBench::look_up(OccupancyPattern pattern, int box_cells,
   static thread_local Found out;
   std::array<QueryBox, kBatch> asked{};
   volatile std::size_t keep = 0;
-  // In turns, so that whatever else the machine does meets all alike.
+  // Engines run in turns, so that other load of the machine affects all alike.
   for (std::size_t round = 0; round < kRounds; ++round) {
     for (const OccupancyEngine engine : kOccupancyEngines) {
       const auto e = static_cast<std::size_t>(engine);
@@ -247,16 +249,16 @@ void OccupancyBench::look_up(OccupancyPattern pattern, int box_cells,
       const auto start = std::chrono::steady_clock::now();
       const std::chrono::duration<double> limit(options_.quick ? 0.005 : 0.15);
       for (std::size_t n = 0; n < boxes.size() / kBatch; ++n) {
-        // On from where the last round ended; the first batch of a round warms up.
+        // Continues where the last round ended. The first batch of a round is a warm-up.
         const std::size_t first = at[e], count = samples[e].batch;
         at[e] = (first + count) % boxes.size();
-        // Who asks has the question at hand. Read from a list of ten megabytes, one took 3 to 5 ns where
-        // another engine had been at the caches in between.
+        // Boxes are copied first, because a caller has them at hand. From a list of ten megabytes, reading
+        // one took 3 to 5 ns if another engine had used the caches in between.
         std::copy_n(boxes.begin() + static_cast<std::ptrdiff_t>(first), count, asked.begin());
         const std::span questions(asked.data(), count);
         std::size_t found = 0;
         const std::uint64_t begin = TickTimer::begin();
-        switch (engine) {  // a loop of its own for each: none pays for the choice
+        switch (engine) {  // each engine has its own loop, so none pays for the switch
           case OccupancyEngine::map:
             for (const QueryBox& box : questions) found += ask(OccupancyEngine::map, box, out);
             break;
@@ -285,9 +287,9 @@ void OccupancyBench::look_up(OccupancyPattern pattern, int box_cells,
   }
 }
 
-// Voxels move to the next cell outwards and come back, one after another in the lattice's order or anywhere.
+// Moves voxels to the next cell outwards and back, one after another: in the lattice's order, or at random.
 void OccupancyBench::update_voxels(const std::function<void(OccupancyRow)>& add) {
-  std::vector<glm::dvec3> moved = ball_.points;  // of brute force: all there is to update
+  std::vector<glm::dvec3> moved = ball_.points;  // brute force has nothing else to update
   SplitMix64 random(3);
   for (const OccupancyPattern pattern : {OccupancyPattern::coherent, OccupancyPattern::random}) {
     Samples map{{}, kBatch}, brute{{}, kBatch};
@@ -332,7 +334,7 @@ void OccupancyBench::update_voxels(const std::function<void(OccupancyRow)>& add)
   }
 }
 
-// The whole ball moves: a fifth of a cell a time, or anywhere.
+// Moves the whole ball: by a fifth of a cell each time, or to random places.
 void OccupancyBench::update_body(const std::function<void(OccupancyRow)>& add) {
   auto cells = std::make_shared<SurfaceCells>(ball_.cell_m, glm::dvec3(0.0));
   for (const auto& t : ball_.mesh.triangles)
@@ -434,7 +436,8 @@ std::vector<OccupancyRow> bench_occupancy(const OccupancyBenchOptions& options) 
       say(what_name(what), count);
       OccupancyBench(options, make_ball(what, count)).run(add);
     }
-    // Beside the ball of all voxels, the same ball as a session has it.
+    // For comparison with the ball of all voxels: the same ball with only its surface in the map, as in a
+    // session.
     say("voxels, of which the surface", count);
     OccupancyBench(options, make_ball_surface_of(count)).run(add);
   }

@@ -9,7 +9,8 @@
 
 namespace hybrid {
 
-// Look-up time over occupied cells, both as logarithms. Throws std::runtime_error: file not writable.
+// Look-up time over occupied cells, both axes logarithmic. Throws std::runtime_error if the file is not
+// writable.
 void save_occupancy_plot(const std::filesystem::path& svg, const std::vector<bench::OccupancyRow>& rows);
 
 }  // namespace hybrid

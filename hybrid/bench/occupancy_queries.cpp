@@ -13,16 +13,16 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr double kJitter = 0.3;  // cells
+constexpr double kJitter = 0.3;  // cells; largest offset of a voxel from the middle of its cell
 
-// Heights of a ball's columns: the greatest z of the lattice in it; -1: none.
+// Height of a ball's column at (x, y): the greatest z of the lattice in the ball; -1: none.
 int height(double squared_radius, int x, int y) {
   const double left = squared_radius - double{1} * x * x - double{1} * y * y;
   return left < 0.0 ? -1 : static_cast<int>(std::sqrt(left));
 }
 
-// Calls visit(x, y, z) for the voxels with a face that is free, or for all. Columns one after another, as
-// voxels are numbered in a lattice.
+// Calls visit(x, y, z) for the voxels with a free face, or for all. It goes column by column, in the order of
+// a lattice's voxels.
 template <class Visit>
 void each_voxel(double radius, bool all, const Visit& visit) {
   const double r2 = radius * radius;
@@ -88,7 +88,7 @@ OccupancyBall make_ball(OccupancyWhat what, std::size_t count) {
   const auto wanted = static_cast<double>(count);
   if (what == OccupancyWhat::voxels_all) return ball_of(radius_of_volume(count), true);
   if (what == OccupancyWhat::voxels_surface) {
-    // Counted at a radius that is roughly right, and taken in proportion to the area.
+    // Counts the voxels at a radius that is about right, and then scales in proportion to the area.
     const double guess = std::max(3.0, std::sqrt(wanted / 12.0));
     double counted = 0.0;
     each_voxel(guess, false, [&counted](int, int, int) { counted += 1.0; });
@@ -98,7 +98,7 @@ OccupancyBall make_ball(OccupancyWhat what, std::size_t count) {
   ball.what = what;
   ball.radius_m = kSphereRadius_m;
   ball.mesh = make_geodesic_mesh(ball.radius_m, std::max(1, static_cast<int>(std::sqrt(wanted / 20.0))));
-  // A surface of area A touches 1.5 A / cell² cells, in the mean over its directions.
+  // A surface of area A touches 1.5 A / cell² cells, averaged over its directions.
   ball.cell_m =
       ball.radius_m * std::sqrt(6.0 * std::numbers::pi / static_cast<double>(ball.mesh.triangles.size()));
   return ball;
@@ -112,13 +112,14 @@ std::vector<glm::dvec3> places(const OccupancyBall& ball, OccupancyPattern patte
   std::vector<glm::dvec3> at(count);
   SplitMix64 random(2);
   for (std::size_t n = 0; n < count; ++n) {
-    // A surface voxel's cell is about its middle, half a cell from where the lattice counts, and the
-    // outermost ones are up to a cell below the radius.
+    // A voxel's position is in the middle of its cell, half a cell from its lattice point. The outermost
+    // surface voxels are up to a cell below the radius.
     const double surface_m =
         ball.what == OccupancyWhat::triangles ? ball.radius_m : ball.radius_m - 0.5 * kBallCell_m;
     const glm::dvec3 middle(ball.what == OccupancyWhat::triangles ? 0.0 : 0.5 * kBallCell_m);
     if (pattern == OccupancyPattern::empty) {
-      // About the box's corners: 1.2 to 1.4 radii from the middle, and further from a small ball.
+      // Near the corners of the ball's box: 1.2 to 1.4 radii from the middle, and further away for a small
+      // ball.
       const glm::dvec3 d = random.direction();
       const glm::dvec3 corner(d.x < 0.0 ? -1.0 : 1.0, d.y < 0.0 ? -1.0 : 1.0, d.z < 0.0 ? -1.0 : 1.0);
       at[n] = std::max(ball.radius_m * (1.2 + 0.2 * random.unit()), ball.radius_m + 8.0 * ball.cell_m) *

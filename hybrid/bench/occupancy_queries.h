@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `hybrid bench occupancy` puts into the map, and where it asks: a ball of voxels, only its surface or
-// all of it, or its surface as triangles, all by closed formulas.
+// The contents of the map and the places of look-ups in `hybrid bench occupancy`, all from closed formulas.
+// The contents are a ball of voxels, with only its surface or all of it, or the surface as triangles.
 #pragma once
 
 #include <cstdint>
@@ -17,25 +17,26 @@ enum class OccupancyPattern : std::uint8_t { empty, coherent, random };
 const char* what_name(OccupancyWhat what);
 const char* pattern_name(OccupancyPattern pattern);
 
-inline constexpr double kBallCell_m = 1e-3;  // of the map, and between voxels
+inline constexpr double kBallCell_m = 1e-3;  // edge of the map's cells, and spacing of voxels
 
 struct OccupancyBall {
   OccupancyWhat what = OccupancyWhat::voxels_surface;
-  double radius_m = 0.0;           // about the scene's origin
-  double cell_m = kBallCell_m;     // of the map; of triangles such that there are about as many cells
-  std::vector<glm::dvec3> points;  // of voxels: each in a cell of its own, off its middle by up to 0.3 cells
+  double radius_m = 0.0;  // the middle is the scene's origin
+  // For triangles it is chosen so that there are about as many cells as triangles.
+  double cell_m = kBallCell_m;
+  std::vector<glm::dvec3> points;  // voxels: each is in its own cell, up to 0.3 cells off its middle
   polygon::TriangleMesh mesh;
-  std::size_t object_voxels = 0;  // of voxels: of the whole ball, in the map or not
+  std::size_t object_voxels = 0;  // voxels of the whole ball, whether they are in the map or not
 };
 
-// About `count` elements.
+// A ball of about `count` elements.
 OccupancyBall make_ball(OccupancyWhat what, std::size_t count);
-// Only the surface of a ball of which all voxels are about `count`.
+// The surface voxels of a ball that has about `count` voxels in all.
 OccupancyBall make_ball_surface_of(std::size_t count);
 
-// Middles of boxes to ask about. Coherent: along the surface in steps of a fifth of a cell, as a tool at
-// 0.2 m/s does in a tick of 1 ms. Random: anywhere on the surface. Empty: outside of the ball, most
-// of it within its bounding box.
+// Middles of boxes to look up. coherent: along the surface in steps of a fifth of a cell, as a tool at 0.2
+// m/s moves in a tick of 1 ms. random: anywhere on the surface. empty: outside the ball, mostly within its
+// bounding box.
 std::vector<glm::dvec3> places(const OccupancyBall& ball, OccupancyPattern pattern, std::size_t count);
 
 }  // namespace hybrid::bench

@@ -17,7 +17,7 @@ std::string ns_text(double ns) {
                     : fmt::format("{:.4g}M", ns / 1e6);
 }
 
-// The row of another engine to the same question; nullptr: there is none.
+// The row of another engine for the same question; nullptr if there is none.
 const OccupancyRow* same_query(const std::vector<OccupancyRow>& rows, const OccupancyRow& row,
                                OccupancyEngine engine) {
   for (const OccupancyRow& other : rows) {
@@ -34,7 +34,7 @@ std::string name_of(const OccupancyRow& row) {
                      box);
 }
 
-// One line a size of the same ball with all its voxels, and with its surface only.
+// One line for each size: the ball with all its voxels against the ball with only its surface.
 std::string all_against_surface(const std::vector<OccupancyRow>& rows) {
   const auto of_tool = [](const OccupancyRow& row) {
     return row.engine == OccupancyEngine::map && row.op == "lookup" && row.box_cells == 5 &&

@@ -14,16 +14,17 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kFirstPolar = 0.3, kLastPolar = kPi - 0.3;  // rad
 constexpr double kSpiral_s = 20.0;
-constexpr double kStep_m = 1e-4;  // along polylines: 0.1 m/s
+constexpr double kStep_m = 1e-4;  // step along polylines: 0.1 m/s
 constexpr int kPressTicks = 200;
-constexpr double kPressFrom_m = 0.010;  // above the sphere
-constexpr int kTapTicks = 20;           // one way
-constexpr double kTapReach_m = 0.02;    // above and below the surface
-constexpr double kTapTurn = 0.3;        // how far the tap leans from the normal
-constexpr double kSweep_m = 0.095;      // from the tool to where the largest body is clear of it
-constexpr double kMiss_m = 0.03;        // at most this far from the tool passes the body's middle
+constexpr double kPressFrom_m = 0.010;  // start of a press above the sphere
+constexpr int kTapTicks = 20;           // ticks of the way in, and of the way out
+constexpr double kTapReach_m = 0.02;    // reach of a tap above and below the surface
+constexpr double kTapTurn = 0.3;        // tilt of a tap from the normal
+// Distance from the tool at which even the largest body is clear of it.
+constexpr double kSweep_m = 0.095;
+constexpr double kMiss_m = 0.03;  // greatest distance at which the body's middle passes the tool
 
-// Ticks to `to` from where the path ends: steps of at most kStep_m, the end hit exactly.
+// Adds goals from the path's end to `to`, in steps of at most kStep_m. The last goal is exactly `to`.
 void add_leg(std::vector<glm::dvec3>& goals, const glm::dvec3& to) {
   const glm::dvec3 from = goals.back();
   const int n = static_cast<int>(std::ceil(glm::length(to - from) / kStep_m));
@@ -78,7 +79,7 @@ glm::dvec3 spiral_direction(double t_s, double speed_m_s) {
   const double down = least_spiral_speed_m_s();
   const double around = std::sqrt(std::max(0.0, speed_m_s * speed_m_s - down * down));
   const double th = kFirstPolar + polar_rate * t_s;
-  // ∫ dθ / sin θ = ln tan(θ/2): the azimuth's rate grows near the poles as its circles shrink.
+  // ∫ dθ / sin θ = ln tan(θ/2). The azimuth turns faster near the poles, where its circles are small.
   const double phi = around / down * (std::log(std::tan(0.5 * th)) - std::log(std::tan(0.5 * kFirstPolar)));
   return {std::sin(th) * std::cos(phi), std::sin(th) * std::sin(phi), std::cos(th)};
 }
@@ -184,7 +185,7 @@ GoalPath edge_path(double tool_radius_m, int laps) {
       add_leg(path.goals, kWay[(leg + 1) % kWay.size()]);
       for (std::size_t i = first; i < path.goals.size(); ++i) {
         const glm::dvec3& g = path.goals[i];
-        // Past the edge the ball falls off the top face at once: the ideal jumps.
+        // Past the edge the ball falls off the top face at once, so the ideal proxy jumps.
         const bool top = leg < 2 || leg == 8 || (leg == 2 && g.x <= kCubeHalf_m);
         path.reference.push_back(top ? on_top(g, least) : on_side(g, least));
       }
@@ -243,7 +244,7 @@ GoalPath moving_path(double speed_m_s, int laps) {
     const double step = speed_m_s * kTick_s;
     const int n = static_cast<int>(std::ceil(4.0 * kSweep_m / step));
     for (int k = 0; k <= n; ++k) {
-      // Way travelled, folded: out to the middle, back, and then all through.
+      // Distance travelled, folded: to the middle, back, and then all the way through.
       const double way = 4.0 * kSweep_m * k / n;
       const double s = way <= kSweep_m         ? way - kSweep_m
                        : way <= 2.0 * kSweep_m ? kSweep_m - way

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The goals that `hybrid bench rigid` drives the proxy along: closed formulas, so that anyone can replay them
-// to the digit against another renderer. A goal is where the device is in one tick of 1 ms.
+// The goals along which `hybrid bench rigid` drives the proxy. They are closed formulas, so anyone can replay
+// them exactly with another renderer. A goal is the device's position in one tick of 1 ms.
 #pragma once
 
 #include <cstdint>
@@ -12,69 +12,73 @@
 namespace hybrid::bench {
 
 inline constexpr double kTick_s = 1e-3;
-inline constexpr double kSphereRadius_m = 0.05;  // of the ball the sphere paths are made for
-inline constexpr double kCubeHalf_m = 0.05;      // of the cube the edge path is made for
-inline constexpr double kCornerSize_m = 0.1;     // edge of the three quarter planes of the corner paths
-inline constexpr double kSlideDepth_m = 0.005;   // goal below the sphere
-inline constexpr double kHoverGap_m = 0.001;     // tool above the sphere
+inline constexpr double kSphereRadius_m = 0.05;  // radius of the ball for the sphere paths
+inline constexpr double kCubeHalf_m = 0.05;      // half edge of the cube for the edge path
+inline constexpr double kCornerSize_m = 0.1;     // edge of the three quarter planes for the corner paths
+inline constexpr double kSlideDepth_m = 0.005;   // depth of the goal below the sphere
+inline constexpr double kHoverGap_m = 0.001;     // gap between tool and sphere
 
 struct GoalPath {
-  std::vector<glm::dvec3> goals;      // [tick], scene frame (unit: meter)
-  std::vector<std::uint32_t> starts;  // ticks before which the proxy is put at the goal; ascending, 0 first
-  std::uint32_t counted_from = 0;     // ticks before this lead in and are not counted
-  // [tick] where the ideal proxy is (unit: meter); empty: no closed form
+  std::vector<glm::dvec3> goals;  // [tick]; scene's frame (m)
+  // Before these ticks the proxy is placed at the goal; ascending, 0 first.
+  std::vector<std::uint32_t> starts;
+  std::uint32_t counted_from = 0;  // earlier ticks only lead in, and do not count
+  // [tick]; position of the ideal proxy (m). Empty: there is no closed form.
   std::vector<glm::dvec3> reference;
-  std::vector<glm::dvec3> body_m;  // [tick] where the body's origin is; empty: it rests at the scene's
+  // [tick]; position of the body's origin; empty: it stays at the scene's origin.
+  std::vector<glm::dvec3> body_m;
 };
 
-// SplitMix64 (Steele, Lea & Flood 2014): the same draws on every machine, unlike <random>'s distributions.
+// SplitMix64 (Steele, Lea & Flood 2014). Unlike <random>'s distributions it draws the same numbers on every
+// machine.
 class SplitMix64 {
  public:
   explicit SplitMix64(std::uint64_t seed) : state_(seed) {}
   std::uint64_t next() noexcept;
   double unit() noexcept;           // in [0, 1)
-  glm::dvec3 direction() noexcept;  // two draws
+  glm::dvec3 direction() noexcept;  // unit vector; takes two draws
 
  private:
   std::uint64_t state_;
 };
 
-// The spiral over the unit sphere from near one pole to near the other in 20 s, such that a point at
-// kSphereRadius_m moves at exactly `speed_m_s`. The motion from pole to pole alone is 6.4 mm/s, the least.
+// A spiral over the unit sphere, from near one pole to near the other in 20 s. A point at kSphereRadius_m
+// moves at exactly `speed_m_s`. The least speed is 6.4 mm/s: the motion from pole to pole alone.
 glm::dvec3 spiral_direction(double t_s, double speed_m_s);
 double least_spiral_speed_m_s();
 
-// Where the ideal proxy is for a goal near the sphere: on it when the goal is inside, at the goal otherwise.
+// Position of the ideal proxy for a goal near the sphere: on the sphere if the goal is inside, otherwise at
+// the goal.
 glm::dvec3 sphere_reference(const glm::dvec3& goal, double tool_radius_m);
 
-// Sphere: far off (a circle 0.3 m away), 1 mm above it, pressed and drawn over it 5 mm deep (the press leads
-// in), and tapped right into it at 2 m/s, each tap from a fresh start.
+// Paths at the sphere. far: a circle 0.3 m away. hover: 1 mm above it. slide: pressed and drawn over it 5 mm
+// deep, where the press leads in. tap: tapped into it at 2 m/s, each tap with a fresh start.
 GoalPath far_path(int ticks = 5000);
 GoalPath hover_path(double tool_radius_m, double speed_m_s, int ticks = 20000);
 GoalPath slide_path(double tool_radius_m, double speed_m_s, int ticks = 20000);
 GoalPath tap_path(double tool_radius_m, int taps = 5000);
 
-// Mesh of a file whose vertices lie within kSphereRadius_m of the origin: as the slide, but kSlideDepth_m
-// below the surface that is met first along the way to the origin. `surface_m` gives its distance from the
-// origin by direction; where it is empty, the last distance holds. A point at kSphereRadius_m moves at
-// `speed_m_s`. No closed form.
+// As the slide, on the mesh of a file whose vertices are within kSphereRadius_m of the origin. The goal is
+// kSlideDepth_m below the surface that is met first on the way to the origin. `surface_m` gives the distance
+// of that surface from the origin in a direction; if it is empty, the last distance is kept. A point at
+// kSphereRadius_m moves at `speed_m_s`. There is no closed form.
 GoalPath drape_path(double tool_radius_m, double speed_m_s, int ticks,
                     const std::function<std::optional<double>(const glm::dvec3&)>& surface_m);
 
-// Cube: over a face, off its edge, along the next face and round again, in steps of 0.1 mm.
+// Cube: over a face, off its edge, along the next face and back to the start, in steps of 0.1 mm.
 GoalPath edge_path(double tool_radius_m, int laps = 10);
 
-// Corner: along one plane into the second and into the third, a pause, a wiggle, and the way back.
-// `symmetric`: the goal runs in the plane of mesh edges, where a ray between goal and proxy meets them
+// Corner: along one plane into the second and the third, then a pause, a wiggle, and the way back.
+// `symmetric`: the goal moves in the plane of mesh edges, where a ray between goal and proxy meets the edges
 // exactly.
 GoalPath corner_path(double tool_radius_m, bool symmetric, int laps = 10);
-// Corner: three sines through it, at about 1 m/s.
+// Corner: a motion of three sines through the corner, at about 1 m/s.
 GoalPath cornerfast_path(double tool_radius_m, int ticks = 20000);
 
-// The tool rests and the body moves, each lap along another direction and past the tool's place at another
-// distance: halfway over the tool, back, and then right over it. No closed form (the way round is the
-// body's).
+// The tool rests and the body moves. Each lap has another direction, and another distance at which the body
+// passes the tool: halfway over the tool, back, and then all the way over it. There is no closed form,
+// because the body decides the proxy's way round it.
 GoalPath moving_path(double speed_m_s, int laps);
-int moving_laps(double speed_m_s);  // about 20,000 ticks' worth
+int moving_laps(double speed_m_s);  // about 20,000 ticks in all
 
 }  // namespace hybrid::bench

@@ -19,7 +19,7 @@ std::vector<SoftRow> bench_soft(const SoftBenchOptions& options) {
   };
   std::vector<SoftEngine> engines = options.engines;
   if (engines.empty()) engines.assign(kSoftEngines.begin(), kSoftEngines.end());
-  const ScopedFlushToZero flushed;  // as a session has it
+  const ScopedFlushToZero flushed;  // as in a session
   std::vector<SoftRow> rows;
   const AddRow add = [&](SoftRow row) {
     if (options.on_row) options.on_row(row);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `hybrid bench soft`: waves of the chain, relaxation, sessions and loading, by size, depth, slack and
-// material, with the thesis's own algorithm in the same run.
+// `hybrid bench soft`: waves of the chain, relaxation, sessions and loading, over size, depth, slack and
+// material. The thesis's own algorithm is measured in the same run.
 #pragma once
 
 #include <functional>
@@ -12,23 +12,23 @@
 
 namespace hybrid::bench {
 
-const std::vector<std::string>& soft_cases();  // wave, relax, session, load
+const std::vector<std::string>& soft_cases();  // "wave", "relax", "session", "load"
 
 struct SoftBenchOptions {
-  bool quick = false;               // waves up to 5 spacings, small blocks, few repeats
+  bool quick = false;               // only waves up to 5 spacings, small blocks, few repeats
   std::vector<std::string> cases;   // empty: all
   std::vector<SoftEngine> engines;  // empty: all
-  std::vector<double> depths;       // of the waves at slack 0.1, in spacings; empty: 5, 10 and 20
-  double wave_s = 2.0;              // spent on repeating one wave, about; at least five times
-  std::vector<int> sizes;           // voxels an edge, of sessions and loads; empty: 64 and 128
-  double session_s = 2.0;           // of simulated time
+  std::vector<double> depths;       // depths of the waves at slack 0.1, in spacings; empty: 5, 10 and 20
+  double wave_s = 2.0;              // about so much time goes into repeats of a wave; there are at least five
+  std::vector<int> sizes;           // voxels along an edge, for sessions and loads; empty: 64 and 128
+  double session_s = 2.0;           // simulated time of a session
   Progress progress;
-  std::function<void(const SoftRow&)> on_row;  // as soon as there is one
+  std::function<void(const SoftRow&)> on_row;  // called for each row as soon as it is there
 };
 
 std::vector<SoftRow> bench_soft(const SoftBenchOptions& options);
 
-// The parts; each hands its rows to `add`.
+// The parts of the suite. Each gives its rows to `add`.
 using AddRow = std::function<void(SoftRow)>;
 void bench_waves(const SoftBenchOptions& options, const std::vector<SoftEngine>& engines, const AddRow& add);
 void bench_relaxation(const SoftBenchOptions& options, const std::vector<SoftEngine>& engines,

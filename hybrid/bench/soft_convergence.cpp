@@ -12,10 +12,10 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr float kPush = 0.5e-3F;  // m, within the slack: no chain, relaxation alone
-constexpr double kRemedy = 0.2;   // of the thesis's movement: "some small value"
+constexpr float kPush = 0.5e-3F;  // m; less than the slack, so that there is relaxation but no chain
+constexpr double kRemedy = 0.2;   // factor on the thesis's movement: "some small value"
 
-// What is pushed.
+// An object of which one voxel is pushed.
 struct Object {
   voxel::LabelVolume volume;
   voxel::LatticeOptions options;
@@ -34,14 +34,17 @@ Object object_of(const std::array<int, 3>& dims, const std::array<int, 3>& pushe
   return object;
 }
 
-// The corner of a plate, all else held: two links ask for the same step each, and the corner takes both.
+// The corner of a plate in which all other voxels are held. Its two links each ask for the same step, and it
+// makes both.
 Object corner() {
   Object object = object_of({4, 4, 1}, {0, 0, 0}, voxel::ThesisChainMailOptions::Movement::sum);
   for (std::size_t n = 1; n < object.volume.labels.size(); ++n) object.options.anchor_voxels.push_back(n);
   return object;
 }
 
-// All at once and by the mean of its links, a voxel and its neighbours take turns. (By the sum it explodes.)
+// All voxels move at once to the mean of the places that their links require. So a voxel and its neighbours
+// swing in turns.
+// (With the sum it would diverge.)
 Object block() {
   Object object = object_of({15, 15, 8}, {7, 7, 7}, voxel::ThesisChainMailOptions::Movement::mean);
   object.options.anchor_faces = {"-z"};

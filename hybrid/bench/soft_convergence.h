@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thesis's Figure 22: an object that was pushed and let go, round after round of relaxation.
+// The thesis's Figure 22: an object is pushed and let go, and relaxed round after round.
 #pragma once
 
 #include <string>
@@ -9,14 +9,14 @@ namespace hybrid::bench {
 
 struct SettlingCurve {
   std::string name;
-  std::vector<double> displacement;  // [round, from 0] of the pushed voxel from rest, as a share of the push
+  std::vector<double> displacement;  // [round, from 0]; of the pushed voxel from rest, as a share of the push
 };
 struct SettlingObject {
   std::string name;
-  std::vector<SettlingCurve> curves;  // the thesis's relaxation undamped, its remedy, and ours
+  std::vector<SettlingCurve> curves;  // thesis's relaxation undamped; thesis's remedy; ours
 };
 
-// One voxel pushed and let go, in two objects, so many rounds (cycles) each.
+// Pushes one voxel and lets it go, in each of two objects. Each is relaxed for `rounds` rounds (cycles).
 std::vector<SettlingObject> measure_settling(int rounds);
 
 }  // namespace hybrid::bench

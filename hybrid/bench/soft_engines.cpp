@@ -32,8 +32,8 @@ class ChainEngine : public WaveEngine {
     moves_ = push.moves;
   }
   void rest() override {
-    // Only what moved is written: half a gigabyte of zeros would leave lines in the caches that the next wave
-    // has to send to memory first.
+    // Writes only the rows that moved. Half a gigabyte of zeros would leave lines in the caches, which the
+    // next wave would have to send to memory first.
     for (auto& axis : state_->u) {
       for (float* row = axis.begin(); row != axis.end(); row += voxel::kRow) {
         if (std::any_of(row, row + voxel::kRow, [](float u) { return u != 0.0F; }))
@@ -103,17 +103,17 @@ class ClassicEngine : public WaveEngine {
 };
 
 constexpr int kLayer = 8;       // voxels
-constexpr double kLump = 10.0;  // voxels, half a period
+constexpr double kLump = 10.0;  // voxels; half a period of the waves
 constexpr std::uint8_t kRandomLabels = 8;
 
-// Lumps: where three waves at odd angles to the lattice add up.
+// Lumps: regions in which the sum of three waves at odd angles to the lattice is large or small.
 std::uint8_t lump_label(int i, int j, int k) {
   const double x = i * 3.14159 / kLump, y = j * 3.14159 / kLump, z = k * 3.14159 / kLump;
   const double sum = std::sin(x + 0.4 * y + 1.0) + std::sin(y - 0.5 * z + 2.0) + std::sin(z + 0.3 * x + 3.0);
   return sum < -0.7 ? 2 : sum > 0.7 ? 3 : 1;
 }
 
-// Any mixing of the bits serves, as long as it is the same everywhere.
+// Mixes the bits of a voxel's number: the labels look random and are the same on every machine.
 std::uint8_t random_label(std::size_t n) {
   std::uint64_t x = (n + 1) * 0x9E3779B97F4A7C15ULL;
   x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9ULL;
@@ -129,7 +129,7 @@ std::unique_ptr<WaveEngine> make_wave_engine(SoftEngine engine) {
 
 namespace {
 
-// Two neighbouring planes of voxels at a time, so that a volume of any size is looked at in little memory.
+// Inspects two neighbouring planes of voxels at a time, so that a volume of any size needs little memory.
 class Inspection {
  public:
   Inspection(const WaveEngine& engine, const voxel::LabelVolume& volume, const voxel::LatticeOptions& options)
@@ -162,7 +162,7 @@ class Inspection {
   void look_at_plane(int k, const Push& whole) {
     engine_.read_plane(k, plane_);
     for (std::size_t n = 0; n < size_; ++n) {
-      owed_[n] = 0;  // bit of each axis on which it moved, and no link has said why
+      owed_[n] = 0;  // one bit for each axis on which the voxel moved and no link has explained it
       for (int axis = 0; axis < 3; ++axis)
         if (std::fabs(static_cast<double>(plane_[n][axis])) > rounding_)
           owed_[n] = static_cast<std::uint8_t>(owed_[n] | 1U << static_cast<unsigned>(axis));
@@ -206,7 +206,7 @@ class Inspection {
       const double apart = static_cast<double>(b[axis]) - static_cast<double>(a[axis]);
       broken = broken || apart < low - rounding_ || apart > high + rounding_;
       const auto settled = static_cast<std::uint8_t>(~(1U << static_cast<unsigned>(axis)));
-      // The end that is nearer to rest was made to move by the other.
+      // The end that is nearer to rest was moved by the other end.
       if (apart > high - rounding_) {
         if (b[axis] > 0.0F && a[axis] > 0.0F) owed_a &= settled;
         if (b[axis] < 0.0F && a[axis] < 0.0F) owed_b &= settled;
@@ -250,7 +250,7 @@ voxel::LabelVolume wave_volume(const std::string& material, const std::array<int
   if (material == "homogeneous") return volume;
   std::size_t n = 0;
   for (int k = 0; k < dims[2]; ++k) {
-    // From the top down, so that a push meets the same whatever the block's size.
+    // Layers are counted from the top, so that a push meets the same layers for any block size.
     const auto layer = static_cast<std::uint8_t>(1 + (dims[2] - 1 - k) / kLayer % 3);
     for (int j = 0; j < dims[1]; ++j) {
       for (int i = 0; i < dims[0]; ++i, ++n) {

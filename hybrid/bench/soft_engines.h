@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What spreads a wave, behind one interface, so that every engine gets the same inputs in the same run; the
-// inputs; and a look at the result that shares no code with any engine.
+// The engines that spread a wave, behind one interface, so that all get the same inputs in the same run. Also
+// these inputs, and an inspection of the result that shares no code with any engine.
 #pragma once
 
 #include <array>
@@ -16,9 +16,9 @@
 
 namespace hybrid::bench {
 
-inline constexpr double kSoftSpacing_m = 1e-3;  // of every benchmark's soft object
+inline constexpr double kSoftSpacing_m = 1e-3;  // spacing of all soft objects in the benchmarks
 
-// Voxels of a volume that are moved, and by how much from where they are (unit: meter).
+// Voxels of a volume to be moved, and their moves from their present positions (m).
 struct Push {
   std::vector<std::array<int, 3>> sources;
   std::vector<glm::vec3> moves;
@@ -35,21 +35,21 @@ class WaveEngine {
 
   virtual void prepare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
                        const Push& push) = 0;
-  virtual void rest() = 0;      // everything back to rest; not timed
-  virtual double run_us() = 0;  // the push once more, from the state there is
-  // Displacements of plane k of the volume, x fastest (unit: meter).
+  virtual void rest() = 0;      // puts everything back to rest; not timed
+  virtual double run_us() = 0;  // does the push once more, from the present state
+  // Displacements of plane k of the volume, x fastest (m).
   virtual void read_plane(int k, std::vector<glm::vec3>& out) const = 0;
-  [[nodiscard]] virtual std::uint64_t candidates() const = 0;  // looked at in the last run; 0: not counted
+  [[nodiscard]] virtual std::uint64_t candidates() const = 0;  // examined in the last run; 0: not counted
   [[nodiscard]] virtual std::size_t bytes() const = 0;
 };
 std::unique_ptr<WaveEngine> make_wave_engine(SoftEngine engine);
 
-// What a wave from rest did, by more than floats round (the links of the longest way from a source times the
-// spacing of floats at the largest displacement): voxels away from rest; links whose ends differ by more than
-// their limits; voxels that no link at its limit towards a voxel further away made move so far; and how far
-// the sources ended from where they were put (unit: meter). With none of the last three, the state is the
-// definition's: by links at their limits there is a way from each voxel to a source, and none that is
-// shorter.
+// The result of a wave from rest. `moved`: voxels away from rest. `violated`: links beyond their limits.
+// `unsupported`: displaced voxels without a cause, that is without a link at its limit to a voxel that is
+// further from rest. `source_off_m`: greatest distance of a source from its target (m). Differences count
+// above a tolerance for rounding: the links on the longest way from a source, times the spacing of floats at
+// the largest displacement. If the last three are zero, the state is exactly that of the definition: a
+// shortest chain of links at their limits leads from each voxel to a source.
 struct WaveState {
   std::size_t moved = 0, violated = 0, unsupported = 0;
   double source_off_m = 0.0;
@@ -59,10 +59,10 @@ struct WaveState {
 WaveState look_at(const WaveEngine& engine, const voxel::LabelVolume& volume,
                   const voxel::LatticeOptions& options, const Push& whole, double path_links);
 
-// Blocks to push into, spacing 1 mm, lower layer anchored. "homogeneous": one label; "layers": slabs of 8
-// voxels of three labels in turn; "labels": lumps of about 10 voxels of three labels; "random": each voxel
-// one of eight labels. Links of label n may stretch, shorten and shear by `slack` · f spacings: f is 1, 1.5,
-// 2, or 1, 1 + 1/7 … 2 for "random".
+// Materials of blocks with a spacing of 1 mm and an anchored bottom layer. "homogeneous": one label.
+// "layers": slabs of 8 voxels with three labels in turn. "labels": lumps of about 10 voxels with three
+// labels. "random": each voxel has one of eight labels. Links of label n may stretch, shorten and shear by
+// `slack` · f spacings. f is 1, 1.5, 2; for "random" it is 1, 1 + 1/7 … 2.
 const std::vector<std::string>& wave_materials();
 voxel::LabelVolume wave_volume(const std::string& material, const std::array<int, 3>& dims);
 voxel::LatticeOptions wave_options(const std::string& material, double slack);

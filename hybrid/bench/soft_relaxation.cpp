@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A ball pressed ten spacings deep into a block, in steps and without relaxation; then how long until the
-// force on it is within 1 % of what it ends at.
+// A ball is pressed ten spacings deep into a block, in steps and without relaxation. Measured is the time
+// until the force on it is within 1 % of its final value.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,14 +22,14 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr double kDepth = 10.0, kRadius = 10.0;  // (unit: spacing)
+constexpr double kDepth = 10.0, kRadius = 10.0;  // unit: spacing
 constexpr int kSweepsNear = 2;
 constexpr double kConverged = 0.01;
-constexpr double kAsked_us = 100e3;  // when the force error is stated
+constexpr double kAsked_us = 100e3;  // working time after which the force's error is stated
 constexpr int kMostRounds = 4000;
-constexpr double kCalm = 1e-4;                // of the force: it changes by less than this …
-constexpr int kCalmRounds = 30;               // … for so many rounds: there is nothing more to see
-constexpr double kReferenceTolerance = 1e-6;  // of the lattice's force scale
+constexpr double kCalm = 1e-4;   // share of the force; the force is calm if it changes by less …
+constexpr int kCalmRounds = 30;  // … for so many rounds; then the measurement ends
+constexpr double kReferenceTolerance = 1e-6;  // share of the lattice's force scale
 constexpr int kReferenceCycles = 200;
 
 constexpr const char* kWideReference = "the same press, after 400 ticks on a grid of boxes 24 nodes wide";
@@ -45,8 +45,8 @@ constexpr voxel::LinkMaterial kFirm = tight_tissue(20e3), kLimp = tight_tissue(5
 
 struct Limits {
   const char* name;
-  double slack;                   // in spacings, as the row has it; of the tightest material
-  voxel::LinkMaterial top, base;  // the upper 40 % and the rest
+  double slack;                   // unit: spacing; of the tightest material
+  voxel::LinkMaterial top, base;  // of the upper 40 %; of the rest
 };
 
 const std::array<Limits, 6>& all_limits() {
@@ -68,7 +68,7 @@ voxel::LabelVolume cube(int edge) {
   return volume;
 }
 
-// The upper 40 % of label 2.
+// A cube whose upper 40 % has label 2.
 voxel::LabelVolume layered_cube(int edge) {
   voxel::LabelVolume volume = cube(edge);
   const std::size_t base = volume.index(0, 0, edge * 6 / 10);
@@ -106,7 +106,7 @@ class Pressed {
     }
   }
 
-  // As a tick begins.
+  // Lists the voxels near the tool, as a tick does first.
   void touch() {
     near_.clear();
     for (const voxel::VoxelId v : object_->lattice().surface()) {
@@ -124,26 +124,26 @@ class Pressed {
  private:
   std::unique_ptr<voxel::SoftObject> object_;
   std::unique_ptr<voxel::ShadowObject>
-      replica_;  // there from the start, as in a session: the press is news to it
+      replica_;  // made before the press, as in a session, so that the press is new to it
   voxel::ToolInBody tool_;
   std::vector<voxel::VoxelId> near_;
 };
 
-// By whole cycles alone, on an object of its own: apart from another thread's, coarse levels know all there
-// is.
+// Final force, by whole cycles on a separate object. There is no other thread here, so the coarse levels know
+// the whole state.
 double settled_force_N(int edge, const Limits& limits) {
   Pressed pressed(edge, limits, Pressed::Relaxed::here);
   const double tolerance_N = kReferenceTolerance * pressed.object().lattice().force_scale_N();
   for (int n = 0; n < kReferenceCycles; ++n) {
-    pressed.touch();  // other voxels are near than at first
+    pressed.touch();  // other voxels are near now than at first
     if (pressed.object().settle(pressed.tool(), tolerance_N, 1)) break;
   }
   return pressed.force_N();
 }
 
-// What the tick does with an object that stays pressed, and the thread that relaxes it, in turns on one core,
-// until nothing is left to do. `at_rest_N`: what it comes to, where that is known better than whole cycles
-// find it, which stall where a chain is tight.
+// Runs the work of the tick and of its relaxation thread in turns on one core, on an object that stays
+// pressed, until nothing is left to do. `at_rest_N`: the final force if it is known better than from whole
+// cycles, which stall where a chain is tight.
 SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_N) {
   const TickTimer timer;
   Pressed pressed(edge, limits);
@@ -199,7 +199,7 @@ SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_
     row.note = fmt::format("not within 1 % of {:.4f} N when relaxation ended, after {:.0f} ms: {:.4f} N",
                            reference, 1e-3 * us, moments.back().force_N);
   } else {
-    const double reached = last_off.base()->us;  // the moment after
+    const double reached = last_off.base()->us;  // the moment after the last one with an error above 1 %
     row.time_us = Percentiles{reached, reached, reached, reached};
     row.note = fmt::format("until within 1 % of {:.4f} N", reference);
   }
@@ -211,16 +211,16 @@ SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_
   return row;
 }
 
-// The same where the chain is tight from the ball two thirds of the way to the anchors: on the composite
-// grid, where `run` keeps such a contact of tissue that nothing else is near. A tick is all that is done, and
-// nothing is left to another thread.
+// The same press where the chain is tight from the ball to two thirds of the way to the anchors. It is
+// measured on the composite grid, as `run` uses it for tissue that only the tool touches. All work is done in
+// the tick, and none is left to another thread.
 struct TightRow {
   SoftRow row;
   double reference_N = 0.0;
 };
 TightRow tight_row(int edge, bool layered) {
   constexpr double kSlack = kTightSlack;
-  const double depth = std::min(kDepth, 0.7 * kSlack * (edge - 1));  // of a small cube the chain ends sooner
+  const double depth = std::min(kDepth, 0.7 * kSlack * (edge - 1));  // in a small cube the chain ends sooner
   const TickTimer timer;
   const voxel::LabelVolume volume = layered ? layered_cube(edge) : cube(edge);
   voxel::LatticeOptions options;
@@ -238,7 +238,7 @@ TightRow tight_row(int edge, bool layered) {
     tool.centre.z = top + object.reach(tool.radius) - depth * kSoftSpacing_m;
     std::vector<voxel::VoxelId> near(lattice->surface().begin(), lattice->surface().end());
     for (int n = 0; n < kTicks; ++n) {
-      // As a tick begins: what is near, or may be.
+      // As a tick does first: lists the voxels that are near, or may be.
       const double away = object.reach(tool.radius) + kSoftSpacing_m;
       if (object.patches_in_use() != nullptr)
         near.assign(object.near_on_grid().begin(), object.near_on_grid().end());
@@ -283,7 +283,7 @@ TightRow tight_row(int edge, bool layered) {
   return {row, reference_N};
 }
 
-// Its relaxation never ends (Fig 22); what it costs to go round once.
+// The thesis's relaxation never ends (Fig 22), so the time of one round is measured.
 SoftRow classic_row(int edge) {
   const TickTimer timer;
   const voxel::LabelVolume volume = cube(edge);
@@ -326,7 +326,7 @@ void bench_relaxation(const SoftBenchOptions& options, const std::vector<SoftEng
     const TightRow layered = tight_row(edge, true);
     add(layered.row);
     for (const Limits& limits : all_limits()) {
-      if (limits.slack > 0.0 && limits.slack * (edge - 1) < kDepth) continue;  // the chain ends sooner
+      if (limits.slack > 0.0 && limits.slack * (edge - 1) < kDepth) continue;  // the chain would end sooner
       if (options.progress)
         options.progress(fmt::format("relaxation of {0} voxels an edge, {1}", edge, limits.name));
       std::optional<double> at_rest_N;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cubes of tissue, from the scene to the first touch, and pressed by a vigorous hand.
+// Cubes of tissue: from loading the scene to the first touch, and pressed by a vigorous hand.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,18 +14,18 @@ namespace hybrid::bench {
 namespace {
 
 constexpr double kSlack = 0.1, kSpeed = 0.5, kToolRadius = 8.0 * kSoftSpacing_m;
-constexpr double kMostDepth = 20.0;  // (unit: spacing)
-constexpr int kSamples = 1'000'000;  // of the force's error: every tick in which tissue is pressed
+constexpr double kMostDepth = 20.0;  // unit: spacing
+constexpr int kSamples = 1'000'000;  // of the force's error: all ticks in which tissue is pressed
 
-// At slack 0.1 a push reaches ten times as far as it is deep, and no chain is longer than the cube: less deep
-// into the small ones, so that it is the tissue and not its anchor that is felt.
+// At slack 0.1 a push reaches ten times as far as it is deep, and no chain is longer than the cube. So small
+// cubes are pressed less deep: the tool must feel the tissue, not its anchors.
 double depth_for(int edge) {
   return std::min(kMostDepth, edge / 16.0);
 }
 
-// A cube of `edge` voxels, its top pressed again and again at 0.5 m/s, a little elsewhere each time. How far
-// the tool goes up and aside is in proportion to how deep it presses, so that it is in contact for as much of
-// the time in cubes of all sizes: medians would tell that, not the size.
+// A cube of `edge` voxels. Its top is pressed again and again at 0.5 m/s, each time at a slightly different
+// place. The tool's travel upwards and sideways is proportional to its depth. So the share of time in contact
+// is the same for all sizes. Otherwise median times would depend on that share, not on the size.
 Scene cube_scene(int edge, double seconds) {
   Scene scene;
   scene.file = fmt::format("cube of {} voxels an edge", edge);

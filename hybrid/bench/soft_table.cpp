@@ -59,7 +59,7 @@ bool in_study(const SoftRow& row) {
          *row.moved > 0 && row.depth_spacings && row.slack && row.time_us && row.note.empty();
 }
 
-// Log of p50 over log of depth / slack.
+// Slope of log p50 over log(depth / slack).
 std::optional<double> time_exponent(const std::vector<SoftRow>& rows, SoftEngine engine) {
   std::vector<double> x, y;
   for (const SoftRow& row : rows) {
@@ -156,7 +156,7 @@ std::string soft_table_line(const SoftRow& row) {
 }
 
 std::optional<Growth> growth_of(const std::vector<SoftRow>& rows) {
-  std::set<std::pair<double, std::size_t>> points;  // one a ratio and count, whichever engine found it
+  std::set<std::pair<double, std::size_t>> points;  // one for each ratio and count, whichever engine found it
   for (const SoftRow& row : rows) {
     if (in_study(row)) points.insert({*row.depth_spacings / *row.slack, *row.moved});
   }

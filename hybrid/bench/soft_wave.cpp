@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One voxel of a block's top is moved, down or obliquely, and the chain follows.
+// One voxel of a block's top is moved, straight down or obliquely, and the chain follows.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,8 +14,8 @@ namespace {
 
 struct Wave {
   std::string material;
-  double depth = 0.0, slack = 0.1;  // (unit: spacing)
-  int axes = 1;                     // 3: as far on x and y as down
+  double depth = 0.0, slack = 0.1;  // unit: spacing
+  int axes = 1;                     // 1: down; 3: as far on x and y as down
 };
 
 struct Engine {
@@ -33,7 +33,7 @@ std::vector<Engine> engines_of(const std::vector<SoftEngine>& names) {
   return engines;
 }
 
-// The block in which the octahedron of a wave just fits: no side and no anchor cuts it.
+// The size of a block in which the octahedron of a wave just fits, so that no side and no anchor cuts it.
 std::array<int, 3> dims_for(const Wave& wave) {
   const int reach = static_cast<int>(std::ceil(wave.depth / wave.slack)) + 1;
   return {2 * reach + 1, 2 * reach + 1, reach + 2};
@@ -83,10 +83,10 @@ void add_with_speedup(std::vector<SoftRow> rows, const AddRow& add) {
   for (SoftRow& row : rows) add(std::move(row));
 }
 
-// Each engine from rest, in turns, so that whatever else the machine does meets all alike. The first run of a
-// turn does not count: nobody uses two engines at once, and what the other wrote is still in the caches. (Run
-// by run in turns, classic's lines went to memory at our expense: half of the time of a wave ten spacings
-// deep.)
+// Runs each engine from rest, in turns, so that other load of the machine affects all alike. The first run of
+// a turn does not count, because the caches still hold what the other engine wrote, and nobody uses two
+// engines at once. (With a turn of one run, classic's cache lines went to memory during our runs. That was
+// half of the time of a wave ten spacings deep.)
 void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::LabelVolume& volume,
               const voxel::LatticeOptions& options, double most_us, const AddRow& add) {
   double spent_us = 0.0;
@@ -111,8 +111,9 @@ void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::Label
   add_with_speedup(std::move(rows), add);
 }
 
-// The public anchor: 50 voxels an edge, one of the top pushed a hundred times by a tenth of a spacing, the
-// slack that makes its 25,234 displaced voxels. A push's time is the median of the rounds.
+// The published comparison: 50 voxels along an edge, and one voxel of the top pushed a hundred times by a
+// tenth of a spacing. The slack is that which gives its 25,234 displaced voxels. The time of a push is the
+// median over the rounds.
 void run_pushes(std::vector<Engine>& engines, int rounds, const AddRow& add) {
   constexpr int pushes = 100, edge = 50;
   const Wave wave{.material = "homogeneous", .depth = 10.0, .slack = 0.3};
@@ -122,7 +123,7 @@ void run_pushes(std::vector<Engine>& engines, int rounds, const AddRow& add) {
   push.moves.front() /= static_cast<float>(pushes);
   std::vector<std::vector<std::vector<double>>> us(engines.size(), std::vector<std::vector<double>>(pushes));
   for (Engine& engine : engines) engine.does->prepare(volume, options, push);
-  for (int round = -1; round < rounds; ++round) {  // the first warms
+  for (int round = -1; round < rounds; ++round) {  // the first round is a warm-up
     for (std::size_t e = 0; e < engines.size(); ++e) {
       engines[e].does->rest();
       for (auto& times : us[e]) {
@@ -145,7 +146,7 @@ void run_pushes(std::vector<Engine>& engines, int rounds, const AddRow& add) {
   add_with_speedup(std::move(rows), add);
 }
 
-// The thesis's study: the same deformation of materials of different stiffness. What counts is depth/slack.
+// The thesis's study: the same deformation of materials of different stiffness. Only depth / slack matters.
 std::vector<Wave> study(bool quick) {
   std::vector<Wave> waves;
   for (const double slack : {0.1, 0.2, 0.4}) {

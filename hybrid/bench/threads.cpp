@@ -23,11 +23,12 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr std::size_t kHogged = std::size_t{128} << 20U;  // bytes, of each of two
-constexpr std::size_t kPiece = std::size_t{1} << 20U;     // copied between two looks at what else there is
+constexpr std::size_t kHogged = std::size_t{128} << 20U;  // bytes of each of two buffers
+// Bytes copied between two calls of `meanwhile`.
+constexpr std::size_t kPiece = std::size_t{1} << 20U;
 constexpr double kAsOftenAsItCan_hz = 1e6;
 
-// Copies memory until it is told to stop; `meanwhile` is called every 0.1 ms or so.
+// Copies memory until `stop` is set. Calls `meanwhile` about every 0.1 ms.
 template <class Meanwhile>
 void hog_memory(const std::atomic<bool>& stop, const Meanwhile& meanwhile) {
   take_ordinary_priority();
@@ -40,7 +41,7 @@ void hog_memory(const std::atomic<bool>& stop, const Meanwhile& meanwhile) {
   }
 }
 
-// Runs `load` run_beside `work`, and stops it.
+// Runs `load` on a thread beside `work`, and stops it afterwards.
 template <class Load, class Work>
 void run_beside(const Load& load, const Work& work) {
   std::atomic<bool> stop{false};
@@ -56,7 +57,7 @@ void run_beside(const Load& load, const Work& work) {
   thread.join();
 }
 
-// Another session of the scene, as fast as it goes, its surfaces taken after each tick.
+// Plays another session of the scene as fast as possible, and takes its surfaces after each tick.
 void relax_and_snap(const Scene& scene, BuiltScene& built, const std::atomic<bool>& stop) {
   take_ordinary_priority();
   set_flush_to_zero();
@@ -75,7 +76,7 @@ void relax_and_snap(const Scene& scene, BuiltScene& built, const std::atomic<boo
   }
 }
 
-// Of one scene.
+// Measures one scene.
 class ThreadBench {
  public:
   ThreadBench(const Scene& scene, const std::string& name) : scene_(scene) {
@@ -87,8 +88,8 @@ class ThreadBench {
     }
   }
 
-  // A path's length under each load, so that what else the machine does comes to all. Progress counts whole
-  // turns: a turn that has begun is counted when it ends.
+  // Plays a path's length under each load, so that other load of the machine affects all of them. Progress
+  // counts whole turns: a turn counts when it has ended.
   template <class Say>
   void turn(const Say& say) {
     const double done_s = seconds_[0];
@@ -150,7 +151,8 @@ class ThreadBench {
                [&] { add(2, run(built, false)); });
   }
 
-  // The session again, as fast as it goes, its results found in the tick and kept.
+  // Plays the session again as fast as possible. Relaxation is computed in the tick, and its results are
+  // kept.
   ResultTape taped(const SessionResult& felt) {
     const ScopedFlushToZero flushed;
     BuiltScene built = build_scene(scene_);
@@ -164,7 +166,7 @@ class ThreadBench {
     return tape;
   }
 
-  // And in real time, its results handed out.
+  // Plays it in real time, with these results handed out by another thread.
   void play(const SessionResult& felt, ResultTape& tape) {
     const ScopedFlushToZero flushed;
     BuiltScene built = build_scene(scene_);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A clock for pieces of work of a few dozen nanoseconds: the processor's time stamp counter, fenced so that
-// nothing of the work runs outside of the two readings. Elsewhere than on x86 the steady clock.
+// A clock for pieces of work of a few dozen nanoseconds: the processor's time stamp counter. It is fenced, so
+// that no part of the work runs outside the two readings. On other processors than x86 it is the steady
+// clock.
 #pragma once
 
 #include <chrono>
@@ -13,7 +14,7 @@ namespace hybrid::bench {
 
 class TickTimer {
  public:
-  TickTimer();  // takes 20 ms: finds the counter's rate, and what an empty measurement shows
+  TickTimer();  // takes 20 ms, to find the counter's rate and the time of an empty measurement
 
 #if defined(__x86_64__)
   static std::uint64_t begin() noexcept {
@@ -40,7 +41,7 @@ class TickTimer {
   [[nodiscard]] double us(std::uint64_t counts) const noexcept {
     return static_cast<double>(counts) * us_per_count_;
   }
-  // The median of empty measurements; it is part of every measured time, and never subtracted.
+  // The median of empty measurements. It is part of every measured time and is never subtracted.
   [[nodiscard]] double overhead_us() const noexcept {
     return overhead_us_;
   }

@@ -9,7 +9,8 @@
 namespace hybrid {
 namespace {
 
-// Signed distance of a point from a box of half size h about the origin, and the way out of it.
+// Signed depth of a point in a box of half size h about the origin, and the direction of the way out.
+// Negative: outside.
 Depth depth_in_box(const glm::dvec3& p, const glm::dvec3& h) {
   const glm::dvec3 beyond = glm::abs(p) - h;
   const glm::dvec3 outside = glm::max(beyond, glm::dvec3(0.0));
@@ -22,7 +23,7 @@ Depth depth_in_box(const glm::dvec3& p, const glm::dvec3& h) {
   return {-beyond[d], out};
 }
 
-// Force of the tissue at an indentation.
+// Force of the tissue at an indentation (m), without the coupling.
 double tissue_force(const ClosedForm& form, const Tool& tool, double indentation) {
   const double modulus = form.young_Pa / (1.0 - form.poisson * form.poisson);
   if (tool.shape == Tool::Shape::punch) return 2.0 * tool.radius_m * modulus * indentation;
@@ -74,7 +75,8 @@ Depth depth_in(const ClosedForm& form, const Tool& tool, const glm::dvec3& devic
     const double distance = glm::length(p);
     depth = {form.half_size_m.x - distance, distance > 0.0 ? p / distance : glm::dvec3(0.0, 0.0, 1.0)};
   } else if (punch) {
-    depth = {form.half_size_m.z - p.z, glm::dvec3(0.0, 0.0, 1.0)};  // its face is what presses
+    // The punch presses with its face, so its radius is not added.
+    depth = {form.half_size_m.z - p.z, glm::dvec3(0.0, 0.0, 1.0)};
   } else {
     depth = depth_in_box(p, form.half_size_m);
   }
@@ -86,7 +88,7 @@ Depth depth_in(const ClosedForm& form, const Tool& tool, const glm::dvec3& devic
 double force_at(const ClosedForm& form, const Tool& tool, double depth_m) {
   if (depth_m <= 0.0) return 0.0;
   if (form.young_Pa == 0.0) return tool.stiffness_N_per_m * depth_m;
-  // The tissue's force grows and the coupling's falls with the indentation: bisection cannot miss.
+  // With the indentation the tissue's force grows and the coupling's falls, so bisection finds their balance.
   double low = 0.0, high = depth_m;
   for (int n = 0; n < 100; ++n) {
     const double middle = 0.5 * (low + high);

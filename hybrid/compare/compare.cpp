@@ -17,11 +17,12 @@
 namespace hybrid {
 namespace {
 
-constexpr double kMeshVoxelShare = 1.0 / 40.0;  // spacing of a voxelised rigid object, of its longest side
+// Voxel spacing of a rigid object: this share of its longest side.
+constexpr double kMeshVoxelShare = 1.0 / 40.0;
 constexpr double kHardYoung_Pa =
-    1e6;  // of a rigid object as voxels: about what a hand takes for hard with a tool of millimeters
+    1e6;  // Young's modulus of a rigid object as voxels: feels about hard with a tool of millimeters
 
-// The scene with one object only, on an ideal device.
+// The scene without objects, on an ideal device. The caller adds the one object.
 Scene bare(const Scene& scene) {
   Scene one = on_ideal_device(scene);
   one.rigid.clear();
@@ -29,8 +30,8 @@ Scene bare(const Scene& scene) {
   return one;
 }
 
-// A rigid object as the soft one of the same shape, of material "hard"; empty where it has no voxels: a
-// sheet, what is thinner than two of them, and a mesh, which may be open.
+// The rigid object as a soft object of the same shape and of material "hard". Empty if the object has no
+// voxels. That holds for a sheet, for a body thinner than two voxels, and for a mesh, which may be open.
 std::optional<SoftDescription> as_soft(const RigidDescription& rigid) {
   SoftDescription soft{.name = rigid.name,
                        .source = {},
@@ -68,13 +69,14 @@ ModelResult run_model(const std::string& name, const Scene& scene, const Progres
   return model;
 }
 
-// Where the object is in each tick; the same for all of one that stays.
+// The object's pose in each tick. All poses are equal if the object does not move.
 std::vector<Pose> poses_along(const RigidDescription& rigid, const Scene& scene, std::size_t ticks) {
   std::vector<Pose> poses(ticks, rigid.pose);
   if (!std::holds_alternative<PathMotion>(rigid.motion)) return poses;
   const RigidMotion motion(rigid, rigid.pose, {}, false);
   double t_s = 0.0;
-  for (Pose& pose : poses) pose = motion.pose_at(t_s += 1.0 / scene.rate_hz);  // as the tick counts it
+  // Summed as the tick sums its time.
+  for (Pose& pose : poses) pose = motion.pose_at(t_s += 1.0 / scene.rate_hz);
   return poses;
 }
 ClosedForm at_pose(const ClosedForm& form, const Pose& pose) {
@@ -98,7 +100,7 @@ ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::ve
   return model;
 }
 
-// The surface of the proxy's own model, without the proxy.
+// Renders the object by the nearest surface, without a proxy. The surface is that of the model with a proxy.
 ModelResult classic_model(const RigidDescription& rigid, const Tool& tool, const std::vector<TraceRow>& like,
                           const std::vector<Pose>& poses) {
   std::vector<BuildNote> notes;
@@ -117,9 +119,9 @@ ModelResult classic_model(const RigidDescription& rigid, const Tool& tool, const
   return model;
 }
 
-// A rigid closed form knows where the device is, and not where it came from: it holds as long as the place it
-// would have the tool at never jumps further than the device moves, seen from the object (the rest is
-// rounding and rounded corners).
+// Does the rigid closed form hold along the motion? It knows only the present position of the device, not the
+// side that the device came from. It holds as long as its tool position never jumps further than the device
+// moves, in the object's frame. The tolerances are for rounding and for rounded corners.
 bool holds_along(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& rows,
                  const std::vector<Pose>& poses) {
   if (form.young_Pa > 0.0) return true;
@@ -151,7 +153,7 @@ Scene on_ideal_device(const Scene& scene) {
   Scene ideal = scene;
   ideal.device_model = device::DeviceModel::ideal;
   ideal.real_device.reset();
-  ideal.max_force_given = true;  // the ideal device has no limit, and a comparison wants the whole force
+  ideal.max_force_given = true;  // The ideal device has no limit, and a comparison needs the whole force.
   ideal.safety.max_force_N = 1e6;
   ideal.safety.max_slew_N_per_s = 1e12;
   ideal.safety.soft_start_s = 0.0;
@@ -198,7 +200,7 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
     throw std::runtime_error(
         fmt::format("{}: no object \"{}\"; it has{}", scene.file.string(), object, names));
   }
-  // The soft object comes first where the user did not choose: it is where the models differ.
+  // If the user named no object, the first soft one is taken: there the models differ.
   const bool is_soft = soft != scene.soft.end();
   Comparison result{.object = is_soft ? soft->name : rigid->name, .models = {}, .reference_text = {}};
   result.jnd_floor_N = jnd_floor_N(scene);
@@ -213,7 +215,7 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   }
   const bool punch = scene.tool.shape == Tool::Shape::punch;
   std::optional<ClosedForm> form = is_soft ? closed_form_of(scene, *soft) : closed_form_of(*rigid);
-  if (!punch) {  // a punch feels nothing rigid
+  if (!punch) {  // a punch does not feel rigid objects
     Scene as_proxy = bare(scene);
     as_proxy.rigid.push_back(is_soft ? as_rigid(*soft) : *rigid);
     as_proxy.rigid.back().as_mesh = true;
@@ -233,10 +235,11 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
     Scene as_voxels = bare(scene);
     as_voxels.soft.push_back(*voxels);
     if (!is_soft) as_voxels.materials["hard"] = Material{.young_Pa = kHardYoung_Pa, .place = {}};
-    as_voxels.soft.back().anchors.rigid_within_m = 0.0;  // nothing rigid is left to be held by
+    // There is no rigid object left that could hold the tissue.
+    as_voxels.soft.back().anchors.rigid_within_m = 0.0;
     result.models.push_back(run_model("voxels", as_voxels, progress));
   }
-  if (is_soft && !punch) {  // its tool is a centre and six points around it
+  if (is_soft && !punch) {  // the tool of the thesis is a ball: a centre and six points around it
     if (progress) progress("feeling it as classic");
     result.models.push_back(classic_voxels(scene, *soft, result.models.back().rows));
   }
@@ -251,7 +254,8 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   if (form && !holds_along(*form, scene.tool, result.models.front().rows, poses)) form.reset();
   if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows, poses));
 
-  // A closed form is the reference where it is exact or nearly so; else what the object is in the scene.
+  // The reference is the closed form where it is exact or nearly so. Otherwise it is the model with which the
+  // scene itself renders the object.
   const bool by_form = form && form->caveat.find("left out") == std::string::npos;
   result.reference = by_form ? result.models.size() - 1 : (is_soft && !punch ? 1 : 0);
   result.reference_text =

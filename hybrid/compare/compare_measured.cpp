@@ -24,7 +24,8 @@ double between(const std::vector<double>& values, std::size_t before, double sha
   return share == 0.0 ? values[before] : values[before] + share * (values[before + 1] - values[before]);
 }
 
-// What was measured at the time of each row that the scene was felt at. Rows in a gap leave both.
+// The measured forces at the times of the rows of `felt`. Rows in a gap of the measurement are removed from
+// both.
 ModelResult measured_model(const device::MeasuredTrajectory& trajectory, const std::string& file,
                            ModelResult& felt, std::size_t& in_gaps) {
   ModelResult measured{.name = "measured: " + file, .rows = {}, .depth_m = {}, .tick_us = {}};
@@ -40,7 +41,8 @@ ModelResult measured_model(const device::MeasuredTrajectory& trajectory, const s
     if (!trajectory.force_N.empty()) {
       at.force_N = between(trajectory.force_N, before, share);
     } else {
-      // Its strength alone: along the rendered force, so that the difference is one of strength.
+      // Only the strength was measured. It is taken along the rendered force, so that the difference is one
+      // of strength.
       const double length = glm::length(row.force_N);
       const glm::dvec3 along = length > 0.0 ? row.force_N / length : glm::dvec3(0.0, 0.0, 1.0);
       at.force_N = between(trajectory.strength_N, before, share) * along;
@@ -77,7 +79,7 @@ MeasuredComparison compare_measured(const Scene& scene, const MeasuredOptions& o
     result.notes.insert(result.notes.end(), positions.notes.begin(), positions.notes.end());
     motion = {.t_s = std::move(positions.t_s), .position_m = std::move(positions.position_m), .notes = {}};
   }
-  // To the last sample, which is a tick too.
+  // The motion lasts until its last sample, which is a tick too.
   const double seconds = std::min(motion.t_s.back(), trajectory.t_s.back()) + 1.0 / scene.rate_hz;
 
   const Scene ideal = on_ideal_device(scene);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a scene makes the hand feel along a measured motion, against the force that was measured on it: the
+// The rendered force of a scene along a measured motion, against the force that was measured along it: the
 // evaluation of Ruffaldi et al. 2006 (device/paths/trajectory_file.h).
 #pragma once
 
@@ -14,20 +14,21 @@ namespace hybrid {
 
 struct MeasuredOptions {
   device::MeasuredFile measured;
-  // Where the device was, when not where the forces were measured: the in-trajectory of the evaluation, which
-  // lies below the surface by force / stiffness. Empty: the measured file's own positions.
+  // File of the device's positions, if they differ from those where the forces were measured. In the
+  // evaluation it is the in-trajectory, which lies below the surface by force / stiffness. Empty: the
+  // positions of the measured file.
   std::filesystem::path along;
 };
 
 struct MeasuredComparison {
-  Comparison comparison;           // models: the scene, and what was measured, which is the reference
-  double rms_N = 0.0;              // the evaluation's figure: over every sample, in contact or not
+  Comparison comparison;           // two models: the scene, and the measurement, which is the reference
+  double rms_N = 0.0;              // figure of the evaluation: over all samples, with contact or without
   std::size_t samples = 0;         // compared ticks
-  std::size_t in_gaps = 0;         // ticks left out, as nothing was measured there
-  std::vector<std::string> notes;  // of the files
+  std::size_t in_gaps = 0;         // ticks left out, because nothing was measured there
+  std::vector<std::string> notes;  // on the files
 };
 
-// On an ideal device at the scene's rate. Throws SceneError, device::PathError.
+// Runs on an ideal device at the scene's rate. Throws SceneError, device::PathError.
 MeasuredComparison compare_measured(const Scene& scene, const MeasuredOptions& options,
                                     const Progress& progress);
 

@@ -16,18 +16,19 @@
 namespace hybrid {
 namespace {
 
-constexpr int kTimedRounds = 2;        // sessions of each scene; the order is reversed in the second
+constexpr int kTimedRounds = 2;        // sessions of each scene; the second round has the reverse order
 constexpr int kPathSamples = 1000;     // places at which two paths are compared
-constexpr double kSamePath_m = 1e-9;   // rounding of lengths in other units
-constexpr double kDirection_N = 0.1;   // a smaller force has no direction that could be felt
-constexpr double kSamePeriod = 1e-12;  // relative: rounding of a rate
+constexpr double kSamePath_m = 1e-9;   // allows for rounding of lengths in other units
+constexpr double kDirection_N = 0.1;   // the direction of a smaller force cannot be felt
+constexpr double kSamePeriod = 1e-12;  // relative; allows for rounding of a rate
 
 std::string tool_in_words(const Tool& tool) {
   return fmt::format("a {} of radius {:.4g} mm", tool.shape == Tool::Shape::ball ? "ball" : "punch",
                      1e3 * tool.radius_m);
 }
 
-// Unlike one another: the stem; where two are alike, the whole name; where that is alike too, numbered.
+// Names that differ from one another: the stem of the file. If two stems are equal, the whole file name. If
+// those are equal too, the stem with a number.
 std::vector<std::string> scene_names(std::span<const Scene> scenes) {
   std::vector<std::string> names;
   for (std::size_t s = 0; s < scenes.size(); ++s) {
@@ -106,7 +107,8 @@ void measure_scene(ComparedScene& scene, const ComparedScene& reference, double 
   if (scene.onset_s && reference.onset_s) scene.onset_later_s = *scene.onset_s - *reference.onset_s;
 }
 
-// A refusal names the scene's own path, which is not the one that is played.
+// run_session() names the scene's own path when it refuses. The error here also names the path that is
+// played.
 SessionResult play(const Scene& scene, BuiltScene& built, const SessionOptions& options,
                    const std::string& first_name) {
   try {
@@ -165,7 +167,7 @@ ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, cons
       comparison.scenes[s].own_error = result.error;
       for (const std::string& fault : fault_texts(built[s].state->faults))
         comparison.notes.push_back(fmt::format("{}: {}", names[s], fault));
-      built[s] = {};  // its memory is free for the others
+      built[s] = {};  // frees its memory for the other scenes
     }
   }
   for (std::size_t s = 0; s < scenes.size(); ++s) {

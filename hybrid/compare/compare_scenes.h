@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole scenes felt along one motion with the engine of `run`: how their forces and their costs differ. The
-// first scene is the reference. The device is ideal, so that the tool is at the same places in all.
+// Whole scenes played along one motion by the engine of `run`: differences of their forces and costs. The
+// first scene is the reference. The device is ideal, so that the tool is at the same places in all scenes.
 #pragma once
 
 #include <cstddef>
@@ -14,11 +14,12 @@
 
 namespace hybrid {
 
-// Difference of a scene's force from the reference's in the ticks of one kind in which either is felt.
+// Difference of a scene's force from the reference's. It covers the ticks of one kind in which at least one
+// of the two scenes is felt.
 struct ScenesDifference {
   std::uint64_t ticks = 0;
   double p50_jnd = 0.0, p99_jnd = 0.0, max_jnd = 0.0;
-  double max_t_s = 0.0;  // of the greatest difference
+  double max_t_s = 0.0;  // time of the greatest difference
 };
 
 // Collects the differences of one kind of ticks.
@@ -33,15 +34,15 @@ class TickDifferences {
 };
 
 struct ComparedScene {
-  std::string name;  // of its file; made unlike the others'
+  std::string name;  // from the file's name; unlike the names of the other scenes
   std::vector<TraceRow> rows;
   double peak_N = 0.0;
   ScenesDifference all, moving, still;      // moving: the device is faster than kStill_m_per_s
   std::optional<double> direction_p99_deg;  // empty: the two forces are never both large enough
-  std::optional<double> onset_s;            // first tick with more than kJndFloor_N; empty: there is none
-  std::optional<double> onset_later_s;      // than in the reference; empty where either has none
-  ForceError own_error;                     // against the same scene along the same path, played slowly
-  Percentiles tick_us;                      // of the timed sessions together
+  std::optional<double> onset_s;            // first tick with more than kJndFloor_N; empty if there is none
+  std::optional<double> onset_later_s;      // onset_s minus that of the reference; empty if either has none
+  ForceError own_error;                     // against a slow run of the same scene along the same path
+  Percentiles tick_us;                      // of all timed sessions together
   double load_s = 0.0;
   std::uint64_t memory_bytes = 0;  // of objects and occupancy map
   std::uint64_t soft_voxels = 0;
@@ -49,22 +50,23 @@ struct ComparedScene {
 
 struct ScenesComparison {
   std::vector<ComparedScene> scenes;  // the first is the reference
-  std::vector<std::string> notes;     // differences between the scenes that are not compared, in words
+  std::vector<std::string> notes;     // differences between the scenes that are not measured, in words
   double jnd_floor_N = 0.0;
 };
 
-// `samples`: most ticks of each scene that are compared with its own slow run (SessionOptions); 0: none.
-// Throws SceneError; std::runtime_error: tools of another shape or size, or devices at another rate.
+// `samples`: at most so many ticks of each scene are compared with its own slow run (SessionOptions); 0:
+// none. Throws SceneError. Throws std::runtime_error: tools of another shape or size, or devices at another
+// rate.
 ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, const Progress& progress);
 
-// What a built scene takes before a session.
+// The size of a built scene before a session.
 struct SceneSize {
   std::uint64_t memory_bytes = 0;  // of objects and occupancy map
   std::uint64_t soft_voxels = 0;   // of all soft objects
 };
 SceneSize size_of(const BuiltScene& built);
 
-// The result for the scene with this index, not 0, in one sentence.
+// The result for one scene in one sentence. `scene`: index of the scene, at least 1.
 std::string verdict(const ScenesComparison& comparison, std::size_t scene);
 
 }  // namespace hybrid

@@ -11,7 +11,7 @@ ClassicForce nearest_surface_force(const polygon::RigidSurface& surface, const P
   ClassicForce out{.surface_m = device_m};
   const glm::dvec3 p = glm::inverse(pose.rotation) * (device_m - pose.position_m);
   const bool inside = surface.inside(p);
-  // From inside there is always a way out, no further than across the whole object.
+  // From inside there is always a way out. It is no longer than the diagonal of the object's box.
   const double reach = inside ? glm::length(surface.upper() - surface.lower()) : radius_m;
   polygon::NearPoint near;
   if (!surface.nearest(p, reach, near)) return out;
@@ -21,7 +21,7 @@ ClassicForce nearest_surface_force(const polygon::RigidSurface& surface, const P
   if (!(depth > 0.0)) return out;
   out.surface_m = pose.position_m + pose.rotation * near.point;
   out.contact = true;
-  // On the surface itself neither side is right, and this model knows no other.
+  // On the surface itself the distance is 0. Then this model has no direction, and so no force.
   if (distance > 0.0) out.force_N = (stiffness_N_per_m * depth / distance) * (pose.rotation * away);
   return out;
 }

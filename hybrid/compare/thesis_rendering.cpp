@@ -10,7 +10,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kDamping = 0.5;  // the thesis: "some small value"
+// Factor on the movement in relaxation; 1: undamped. The thesis: "some small value".
+constexpr double kDamping = 0.5;
 
 }  // namespace
 
@@ -22,9 +23,9 @@ ModelResult classic_voxels(const Scene& scene, const SoftDescription& soft,
   voxel::ThesisChainMail object(volume, lattice_options(scene, soft), {.damping = kDamping});
   const glm::dquat to_body = glm::conjugate(volume.rotation);
   ModelResult model{.name = kThesisModel, .rows = {}, .depth_m = {}, .tick_us = {}};
-  const ScopedFlushToZero flushed;  // as a session has it
+  const ScopedFlushToZero flushed;  // as in a session
   LatencyHistogram times;
-  object.touch(glm::dvec3(1e9), 0.0);  // touches nothing, and builds the map outside of the first tick
+  object.touch(glm::dvec3(1e9), 0.0);  // touches nothing; builds the map before the first timed tick
   for (const TraceRow& row : like) {
     const Clock::time_point start = Clock::now();
     const auto felt = object.touch(to_body * (row.device_m - volume.origin_m), scene.tool.radius_m);

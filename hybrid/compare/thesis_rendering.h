@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Soft objects as the thesis felt them (voxel/baseline/thesis_chainmail.h), without a proxy: for comparison only.
+// Soft objects as the thesis rendered them (voxel/baseline/thesis_chainmail.h), without a proxy. For
+// comparison only.
 #pragma once
 
 #include <vector>
@@ -8,10 +9,11 @@
 
 namespace hybrid {
 
-// The soft object along the device positions of `like`: each tick the six-direction check, the chain, the
-// force of the lines through the touched element, and relaxation of as many elements as the object's budget
-// says, damped as the thesis has it in the end (which is part of the tick's time, as it is for `voxels`).
-// What is felt is that force itself: there is no coupling. Throws std::exception in words.
+// Plays the soft object along the device positions of `like`. Each tick has the six-direction check, the
+// chain, the force of the lines through the touched element, and relaxation of as many elements as the
+// object's budget says. Relaxation is damped as in the thesis's final version. Its time is part of the tick's
+// time, as it is for `voxels`. The result is this force itself: there is no coupling. Throws std::exception
+// in words.
 ModelResult classic_voxels(const Scene& scene, const SoftDescription& soft,
                            const std::vector<TraceRow>& like);
 

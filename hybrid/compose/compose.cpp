@@ -22,9 +22,9 @@ namespace fs = std::filesystem;
 
 constexpr const char* kScene = "scene.toml";
 constexpr const char* kDraft = "draft.toml";
-constexpr std::size_t kMostPlaces = 12;  // objects of a segmentation that are said one by one
+constexpr std::size_t kMostPlaces = 12;  // a segmentation with more objects gets no list of places
 
-// "head" of "head.nii.gz" and of "head/".
+// The name without its extensions: "head" of "head.nii.gz" and of "head/".
 std::string stem_of(const fs::path& file) {
   fs::path name = file.filename().empty() ? file.parent_path().filename() : file.filename();
   while (name.has_extension() && name.stem() != name) name = name.stem();
@@ -91,7 +91,7 @@ std::string in_words(const voxel::VolumeHeader& h) {
                      h.spacing_m.z * 1e3, h.origin_m.x * 1e3, h.origin_m.y * 1e3, h.origin_m.z * 1e3);
 }
 
-// The box that the centres of the outermost voxels span in the scene.
+// The box around the centres of the outermost voxels, in the scene.
 ObjectBox span_of(const voxel::VolumeHeader& h) {
   ObjectBox box{glm::dvec3(1e300), glm::dvec3(-1e300)};
   for (int corner = 0; corner < 8; ++corner) {
@@ -107,8 +107,8 @@ ObjectBox span_of(const voxel::VolumeHeader& h) {
   return box;
 }
 
-// Labels drawn on another grid than the scan's mean that one of both files is the wrong one. Formats count
-// the axes from different ends, so it is where the voxels lie that is compared, and how many there are.
+// If the labels have another grid than the scan, one of the two files is the wrong one. Formats may count the
+// axes from different ends. So the places of the voxels and their numbers are compared, not the axes.
 void check_grid(const fs::path& scan, const fs::path& labels) {
   const voxel::VolumeHeader a = voxel::read_volume_header(scan), b = voxel::read_volume_header(labels);
   const double near = 0.1 * std::min({a.spacing_m.x, a.spacing_m.y, a.spacing_m.z});
@@ -181,8 +181,9 @@ void compose_segmentation(const ComposeOptions& options, ComposeFolder& folder, 
   }
 }
 
-// Where objects lie, whose boxes overlap, and what lies far from everything else: all may be meant, or a
-// wrong unit or place. Bones in a body overlap it by nature.
+// Notes on the places of objects, on boxes that overlap, and on objects far from everything else. Each may be
+// intended, or may come from a wrong unit or place. In a segmentation of many objects overlap is normal:
+// bones overlap the body.
 std::vector<std::string> places(const World& world, bool segmented) {
   std::vector<std::string> found;
   const std::size_t count = world.object_count();
@@ -213,7 +214,7 @@ std::vector<std::string> places(const World& world, bool segmented) {
   return found;
 }
 
-// A path that any scene can begin with: far from everything, so that the scene can be built and looked at.
+// A path for a scene that is only built: far from everything.
 PressPath no_path() {
   PressPath path;
   path.points = {{glm::dvec3(0.0, 0.0, 1e3), 0.0, {}}, {glm::dvec3(0.0, 0.0, 1.001e3), 0.0, {}}};
@@ -240,7 +241,7 @@ Composed compose_starter(const ComposeOptions& options) {
 
 Composed compose(const ComposeOptions& options, const Progress& progress) {
   if (options.inputs.empty() && options.labels.empty()) return compose_starter(options);
-  // What can be known to be wrong is refused before anything is written.
+  // Options and files that are known to be wrong are refused before anything is written.
   for (const fs::path& file : options.inputs)
     check_exists(file, "give a mesh, a volume or a folder of a DICOM series");
   if (!options.labels.empty()) check_exists(options.labels, "give the label volume of the segmentation");
@@ -293,8 +294,8 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
                            : scans.empty()        ? options.labels
                                                   : scans[0]);
 
-  // Built once with a path that touches nothing: the surfaces say where a path can touch. (What the build
-  // carves is then known too.)
+  // The scene is built once with a path that touches nothing. Its surfaces, after carving, show where a path
+  // can touch.
   folder.write_text(kDraft, scene_text(parts, settings, no_path()));
   Composed composed{.scene = folder.scene(), .tool_radius_m = settings.tool_radius_m};
   {

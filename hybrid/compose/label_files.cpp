@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads the files in which programs keep the names of labels.
+// Reads the files in which programs store the names of labels.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,10 +20,10 @@
 namespace hybrid {
 namespace {
 
-constexpr std::uintmax_t kMostBytes = 1U << 20;  // FreeSurfer's table of all its labels has a tenth of this
-constexpr int kMostLabel = 255;                  // of a volume
+constexpr std::uintmax_t kMostBytes = 1U << 20;  // ten times the size of FreeSurfer's table of all its labels
+constexpr int kMostLabel = 255;                  // the highest label of a volume
 
-// The place of the first byte that is no UTF-8 (RFC 3629); npos if there is none.
+// Position of the first byte that is not UTF-8 (RFC 3629); npos if there is none.
 std::size_t first_outside_utf8(std::string_view text) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
   for (std::size_t i = 0; i < text.size();) {
@@ -99,7 +99,7 @@ std::string read_text(const std::filesystem::path& file) {
   return text;
 }
 
-// Collects names. A volume holds labels up to 255, so that a name of a higher one says nothing about it.
+// Collects names. A volume has labels up to 255, so names of higher labels are skipped.
 class NameTable {
  public:
   explicit NameTable(const std::filesystem::path& file) : file_(file.string()) {}
@@ -107,7 +107,7 @@ class NameTable {
   void add(long long label, std::string_view name, const std::string& where) {
     if (label < 0)
       throw ComposeError(fmt::format("{}: label {} is below 0; renumber the labels", where, label));
-    if (label == 0 || name.empty()) return;  // empty space; no name
+    if (label == 0 || name.empty()) return;  // label 0 is empty space; a label without a name is skipped
     if (label > kMostLabel) {
       if (beyond_ == 0) beyond_ = label;
       return;
@@ -145,7 +145,7 @@ std::optional<long long> number_in(const NameJson& value) {
   return std::nullopt;
 }
 
-// The first member of these names that `read` understands.
+// The value of the first of these keys that `read` can convert.
 template <typename Read>
 auto member(const NameJson& object, std::initializer_list<const char*> keys, Read&& read) {
   decltype(read(object)) found;
@@ -155,8 +155,8 @@ auto member(const NameJson& object, std::initializer_list<const char*> keys, Rea
   return found;
 }
 
-// {"liver": 1}, {"1": "liver"}, and regions {"tumour": [2, 3]}, which nnU-Net trains on: a label that has no
-// name of its own is called by the smallest region that it is in.
+// Reads {"liver": 1}, {"1": "liver"}, and nnU-Net's regions {"tumour": [2, 3]}. A label without a name of its
+// own gets the name of the smallest region that contains it.
 void add_members(const NameJson& table, NameTable& names, const std::string& where) {
   std::set<long long> named;
   std::map<long long, std::pair<std::size_t, std::string>> by_region;
@@ -182,7 +182,7 @@ void add_members(const NameJson& table, NameTable& names, const std::string& whe
   }
 }
 
-// ["empty", "liver"], or objects with a number and a name each.
+// Reads ["empty", "liver"], or a list of objects, each with a number and a name.
 void add_items(const NameJson& table, NameTable& names, const std::string& where) {
   for (std::size_t n = 0; n < table.size(); ++n) {
     const NameJson& item = table[n];

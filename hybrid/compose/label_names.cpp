@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kMostListed = 40;  // names in a refusal
+constexpr std::size_t kMostListed = 40;  // most names that an error message lists
 
 std::optional<int> whole_number(std::string_view text) {
   int number = 0;

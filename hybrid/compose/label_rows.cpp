@@ -15,9 +15,9 @@
 namespace hybrid {
 namespace {
 
-constexpr char kBlanks = ' ';            // as a separator: any number of spaces and tabs
+constexpr char kBlanks = ' ';            // as a separator it stands for any number of spaces and tabs
 constexpr std::size_t kLeastColour = 3;  // red, green, blue
-constexpr std::size_t kMostColour = 4;   // and how opaque
+constexpr std::size_t kMostColour = 4;   // and opacity
 
 struct RowField {
   std::string text;
@@ -42,13 +42,14 @@ bool is_decimal(std::string_view word) {
   return error == std::errc() && end == word.data() + word.size() && digits;
 }
 
-// "#ff0080", with or without how opaque.
+// "#ff0080", with opacity or without.
 bool is_hex_colour(std::string_view word) {
   return (word.size() == 7 || word.size() == 9) && word.front() == '#' &&
          std::all_of(word.begin() + 1, word.end(), [](unsigned char c) { return std::isxdigit(c) != 0; });
 }
 
-// Takes the first field off `row`, with the separator after it. In quotes, "" stands for one quote.
+// Removes the first field and the separator after it from `row`, and returns the field. Within quotes, ""
+// stands for one quote.
 RowField take_field(std::string_view& row, char separator) {
   const auto ends = [&](char c) { return separator == kBlanks ? is_blank(c) : c == separator; };
   while (!row.empty() && is_blank(row.front()) && (separator != '\t' || row.front() == ' '))
@@ -80,13 +81,14 @@ RowField take_field(std::string_view& row, char separator) {
 
 std::vector<RowField> fields_of(std::string_view row, char separator) {
   std::vector<RowField> fields;
-  const bool open = !row.empty() && row.back() == separator && separator != kBlanks;  // an empty last field
+  // The last field is empty.
+  const bool open = !row.empty() && row.back() == separator && separator != kBlanks;
   while (!row.empty()) fields.push_back(take_field(row, separator));
   if (open) fields.emplace_back();
   return fields;
 }
 
-// The separator that stands after the first field of a row.
+// The separator after the first field of a row.
 char separator_after_first(std::string_view row) {
   const std::size_t closing = row.starts_with('"') ? row.find('"', 1) : std::string_view::npos;
   row.remove_prefix(closing != std::string_view::npos ? closing + 1
@@ -96,7 +98,7 @@ char separator_after_first(std::string_view row) {
   return given ? row.front() : kBlanks;
 }
 
-// Where the columns of a table are that has a heading.
+// The separator and the columns of a table that has a heading.
 struct RowColumns {
   char separator = ',';
   std::size_t label = 0, name = 1;
@@ -111,8 +113,8 @@ std::string column_word(std::string_view text) {
   return word;
 }
 
-// Empty: the row is no heading. In order of preference, as "label" is the number in one table and the name in
-// another.
+// Reads a row as a heading; empty if it is none. Words are listed in order of preference, because "label" is
+// the number in one table and the name in another.
 std::optional<RowColumns> heading_of(std::string_view row) {
   static constexpr std::array<std::string_view, 14> kNumbers{
       "index", "idx",    "id", "labelid", "labelvalue", "labelindex", "labelnumber",
@@ -143,10 +145,10 @@ std::optional<RowColumns> heading_of(std::string_view row) {
   return columns;
 }
 
-// A row that is read; the colour that may follow the name is not yet taken off.
+// A row that was read. A colour after the name has not been removed yet.
 struct OpenRow {
   LabelRow row;
-  std::vector<std::string> words;  // of the name, if it was not in quotes
+  std::vector<std::string> words;  // words of the name, if the name was not in quotes
   [[nodiscard]] std::size_t numbers_at_end() const {
     const auto last = std::find_if_not(words.rbegin(), words.rend(), is_decimal);
     return static_cast<std::size_t>(last - words.rbegin());
@@ -172,7 +174,8 @@ class RowReader {
   }
 
   std::vector<LabelRow> rows() && {
-    // Rows of one table have colours of one length. A name may end with numbers itself.
+    // All rows of a table have colours of the same length. So the shortest run of numbers is the colour, and
+    // longer runs begin with numbers of the name.
     std::size_t colour = kMostColour;
     for (const OpenRow& open : rows_) {
       if (open.numbers_at_end() >= kLeastColour) colour = std::min(colour, open.numbers_at_end());
@@ -226,7 +229,7 @@ class RowReader {
     rows_.push_back(std::move(open));
   }
 
-  // Number, then fields: the first that is no colour is the name.
+  // Reads a number followed by fields. The first field that is no colour is the name.
   void read_fields(long long label, const std::vector<RowField>& fields, std::size_t line) {
     OpenRow open{.row = {.line = line, .label = label, .name = {}}, .words = {}};
     std::size_t numbers = 0;
@@ -243,11 +246,12 @@ class RowReader {
       rows_.push_back(std::move(open));
       return;
     }
-    if (numbers == 1 && fields.size() == 2) open.row.name = fields[1].text;  // a number is the name
+    // The only other field is a number: it is the name.
+    if (numbers == 1 && fields.size() == 2) open.row.name = fields[1].text;
     rows_.push_back(std::move(open));
   }
 
-  // Number, then words: a name in quotes, or what stands before the colour or behind it.
+  // Reads a number followed by words. The name is in quotes, or before the colour, or after it.
   void read_words(long long label, const std::vector<RowField>& fields, std::size_t line) {
     OpenRow open{.row = {.line = line, .label = label, .name = {}}, .words = {}};
     const auto quoted =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What needs no labels: meshes, and volumes of intensities.
+// Parts of a scene from files without labels: meshes, and volumes of intensities.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,12 +19,14 @@
 namespace hybrid {
 namespace {
 
-constexpr double kReadyVoxels = 1.5e6;  // more tissue is read coarser, unless --spacing says otherwise
-constexpr std::size_t kBins = 64;       // of the histogram; a reader's rules are tried one by one
-constexpr double kSmall_m = 5e-3;       // a mesh below this in mm was likely made in meters
-constexpr double kBone_HU = 300.0;      // a CT's value from which on a voxel is bone
+constexpr double kReadyVoxels = 1.5e6;  // tissue with more voxels is read coarser, unless --spacing is given
+// Bins of the histogram; there is one rule per bin, and rules are tried one by one.
+constexpr std::size_t kBins = 64;
+// A mesh smaller than this when read in mm was probably made in meters.
+constexpr double kSmall_m = 5e-3;
+constexpr double kBone_HU = 300.0;  // a voxel of a CT from this value on is bone
 
-// The bin above which tissue begins: the split of the histogram into two classes with the greatest variance
+// The bin above which tissue begins. It splits the histogram into the two classes with the greatest variance
 // between them (Otsu 1979).
 std::size_t otsu(const std::array<double, kBins>& count) {
   double all = 0.0, moment = 0.0;
@@ -47,12 +49,13 @@ std::size_t otsu(const std::array<double, kBins>& count) {
   return best;
 }
 
-// From where on a volume is tissue.
+// The intensity from which on a volume is tissue.
 double tissue_from(const std::filesystem::path& file, const voxel::VolumeStatistics& statistics) {
   const double width = (statistics.maximum - statistics.minimum) / static_cast<double>(kBins);
   voxel::VolumeFileOptions options;
   options.max_bytes = usable_memory_bytes() / 4;
-  for (std::size_t b = 0; b < kBins; ++b) {  // the first rule that fits wins: bin b is below its upper end
+  // The first rule that fits wins, so bin b gets the values below its upper end.
+  for (std::size_t b = 0; b < kBins; ++b) {
     const double upper =
         b + 1 == kBins ? statistics.maximum : statistics.minimum + width * (static_cast<double>(b) + 1.0);
     options.rules.push_back({statistics.minimum, upper, static_cast<std::uint8_t>(b + 1)});
@@ -64,7 +67,7 @@ double tissue_from(const std::filesystem::path& file, const voxel::VolumeStatist
   return statistics.minimum + width * (static_cast<double>(otsu(count)) + 1.0);
 }
 
-// Nothing tells bone from tissue in a volume without labels. In a CT bone is what is bright.
+// Adds a note on bright voxels. Without labels bone cannot be told from tissue. In a CT bone is bright.
 void note_bone(const std::filesystem::path& file, const std::string& name, const voxel::LabelVolume& tissue,
                const voxel::VolumeStatistics& statistics, SceneParts& parts) {
   if (statistics.maximum < kBone_HU) return;
@@ -96,9 +99,10 @@ std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::siz
   if (!many && !uneven) return std::nullopt;
   why = fmt::format("{} voxels of tissue", filled);
   if (uneven) why += fmt::format(" in slices of {:.3g} mm and pixels of {:.3g} mm", 1e3 * thick, 1e3 * fine);
-  const double now = std::cbrt(h.x * h.y * h.z);  // the same number of voxels
+  // Edge of a cube of the same volume, so the number of voxels stays the same.
+  const double now = std::cbrt(h.x * h.y * h.z);
   const double wanted = now * std::cbrt(std::max(1.0, static_cast<double>(filled) / kReadyVoxels));
-  // Rounded up to two digits, which is what a person reads.
+  // The spacing is rounded up to two digits, because a person reads it.
   const double digit = std::pow(10.0, std::floor(std::log10(wanted)) - 1.0);
   return std::ceil(wanted / digit) * digit;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Labels and surfaces of a segmentation. Volumes without labels and meshes: parts_from_files.cpp.
+// Parts of a scene from the labels of a segmentation. For meshes and volumes without labels see
+// parts_from_files.cpp.
 #include "hybrid/compose/parts_from_labels.h"
 
 #include <fmt/format.h>
@@ -24,10 +25,12 @@ namespace {
 
 using voxel::LabelVolume;
 
-constexpr std::size_t kLeastBoneVoxels = 8;    // fewer have no surface worth a touch
-constexpr std::size_t kLeastPieceVoxels = 27;  // loose specks of soft labels below this are left out
-constexpr int kSmoothing = 10;                 // passes; the default of a scene's volume surface
-constexpr double kHeldWithin = 1.6;            // spacings from bone: the voxels beside it, carved or not
+constexpr std::size_t kLeastBoneVoxels = 8;    // a smaller bone is left out
+constexpr std::size_t kLeastPieceVoxels = 27;  // smaller loose pieces of soft labels are left out
+// Passes of smoothing; the default for surfaces from volumes in a scene.
+constexpr int kSmoothing = 10;
+// Spacings; voxels this near to bone are held, whether the bone is carved out or not.
+constexpr double kHeldWithin = 1.6;
 
 struct Box {
   std::array<int, 3> low{1 << 30, 1 << 30, 1 << 30}, high{-1, -1, -1};
@@ -56,7 +59,8 @@ std::array<Box, 256> label_boxes(const LabelVolume& volume) {
   return boxes;
 }
 
-// The part of a volume within a box; a voxel of it keeps its label where `keep` says so.
+// The part of a volume within a box. A voxel keeps its label if `keep` returns true for it, otherwise it
+// becomes empty.
 template <typename Keep>
 LabelVolume cropped(const LabelVolume& volume, const Box& box, Keep&& keep) {
   LabelVolume part;
@@ -117,7 +121,7 @@ void add_bone(const LabelVolume& fine, int label, const std::string& label_name,
                         .source = check.oriented ? "closed surface" : "sheet"});
 }
 
-// Which pieces of the soft labels touch something rigid: the voxels around them, corners too.
+// Marks the pieces of soft labels that touch something rigid. A voxel touches its 26 neighbours.
 std::vector<bool> held_pieces(const LabelVolume& tissue, const std::vector<bool>& rigid,
                               const voxel::ConnectedRuns& runs) {
   std::vector<bool> held(runs.pieces(), false);
@@ -140,8 +144,9 @@ std::vector<bool> held_pieces(const LabelVolume& tissue, const std::vector<bool>
   return held;
 }
 
-// What no bone holds has no equilibrium: specks go, and of the rest the layer nearest to the back (the body
-// lies on it) becomes labels of its own, which the scene anchors.
+// Settles tissue that no bone holds, because it has no equilibrium. Small pieces are removed. In the others,
+// the layer nearest to the back becomes labels of its own, which the scene anchors: the body lies on its
+// back.
 class LooseTissue {
  public:
   LooseTissue(LabelVolume& tissue, SoftPart& part, SceneParts& parts)
@@ -150,7 +155,8 @@ class LooseTissue {
   void settle(const voxel::ConnectedRuns& runs, const std::vector<bool>& held) {
     std::vector<Piece> pieces(runs.pieces());
     const glm::dvec3 down =
-        glm::inverse(tissue_.rotation) * glm::dvec3(0.0, 1.0, 0.0);  // the back, in the lattice
+        // Direction to the back, in the lattice's frame.
+        glm::inverse(tissue_.rotation) * glm::dvec3(0.0, 1.0, 0.0);
     int axis = 0;
     for (int a = 1; a < 3; ++a) axis = std::abs(down[a]) > std::abs(down[axis]) ? a : axis;
     const int sign = down[axis] < 0.0 ? -1 : 1;
@@ -189,7 +195,8 @@ class LooseTissue {
     if (known != twins_.end()) return known->second;
     int twin = 255;
     while (twin > 0 && part_.materials.contains(twin)) --twin;
-    if (twin == 0) return label;  // 255 soft labels: the scene's own refusal says what is free
+    // All 255 labels are in use; the scene's loader will refuse the tissue and explain.
+    if (twin == 0) return label;
     part_.materials[twin] = part_.materials.at(label);
     part_.label_names[twin] = part_.label_names.at(label);
     part_.anchor_labels.insert(twin);
@@ -226,7 +233,7 @@ std::vector<bool> as_flags(const std::set<int>& labels) {
   return flags;
 }
 
-// The object is called what its labels are called: all of a few, else the largest two.
+// The name of the object: the names of its labels if there are few, otherwise those of the two largest.
 std::string name_of_tissue(const LabelVolume& tissue, const LabelNames& names, const std::set<int>& soft) {
   std::vector<std::pair<std::size_t, std::string>> largest;
   for (const auto& [label, count] : label_counts(tissue)) {
@@ -320,7 +327,7 @@ std::map<int, std::size_t> label_counts(const LabelVolume& volume) {
 
 namespace {
 
-// Throws if the file can be read, but what it holds are no labels.
+// Throws if the file can be read but does not hold labels.
 void refuse_intensities(const std::filesystem::path& file) {
   const voxel::VolumeStatistics held = voxel::read_volume_statistics(file, usable_memory_bytes() / 4);
   if (!held.label_counts.empty()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a composed scene is made of, before it is written down: surfaces of bones, tissue, meshes.
+// Parts of a composed scene before it is written: surfaces of bones, tissue, meshes.
 #pragma once
 
 #include <array>
@@ -18,15 +18,15 @@
 
 namespace hybrid {
 
-// Where a person puts an object, as a scene says it.
+// The place of an object as the user gave it, in the units of a scene.
 struct Placement {
   glm::dvec3 position_mm{0.0}, rotation_deg{0.0};
 };
 
 struct RigidPart {
-  std::string name{}, file{};  // file: in the folder
-  std::string unit{};          // of the file: "m", "mm"
-  std::string family{};        // what presses take as one: "rib"
+  std::string name{}, file{};  // file: name within the folder
+  std::string unit{};          // length unit of the file: "m", "mm"
+  std::string family{};        // parts of one family are pressed once, for example "rib"
   std::string comment{};
   bool repair = false;
   Placement placement{};
@@ -34,24 +34,24 @@ struct RigidPart {
 
 struct SoftPart {
   std::string name{}, file{};
-  std::map<int, const Tissue*> materials{};  // label in the file to tissue
-  std::map<int, std::string> label_names{};  // of the same labels
+  std::map<int, const Tissue*> materials{};  // key: label in the file
+  std::map<int, std::string> label_names{};  // the same keys
   std::set<int> anchor_labels{};
   bool anchor_bottom = false;
-  double rigid_within_mm = 0.0;  // 0: not held by what is rigid
+  double rigid_within_mm = 0.0;  // voxels this near to a rigid object are held by it; 0: none
   std::string comment{};
   Placement placement{};
-  voxel::LabelVolume volume{};  // as in the file
+  voxel::LabelVolume volume{};  // as it is in the file
 };
 
-// A row of the table that says what became what.
+// A row of the table that lists each part of the scene and its source.
 struct ComposedPart {
   std::string name{};
   bool rigid = false;
   std::size_t voxels = 0, triangles = 0;
   glm::dvec3 size_m{0.0};
-  double young_Pa = 0.0, poisson = 0.0;  // soft
-  std::string source{};                  // of the stiffness, or of the surface
+  double young_Pa = 0.0, poisson = 0.0;  // only of a soft part
+  std::string source{};                  // source of the stiffness, or kind of the surface
 };
 
 struct SceneParts {
@@ -59,42 +59,42 @@ struct SceneParts {
   std::vector<SoftPart> soft{};
   std::vector<ComposedPart> rows{};
   std::vector<std::string> notes{};
-  bool of_a_body = false;  // a volume says where x (left), y (back) and z (head) are
+  bool of_a_body = false;  // true: a volume gives the directions x (left), y (back) and z (head) of a body
 };
 
-// Labels out of a file, resampled to `spacing_m` where that is given. Throws voxel::VolumeError.
+// Reads labels from a file. They are resampled to `spacing_m` if it is given. Throws voxel::VolumeError.
 voxel::LabelVolume read_labels(const std::filesystem::path& file, std::optional<double> spacing_m,
                                std::vector<std::string>& notes);
 
-// Which labels become what, and what is left out.
+// The labels that become rigid and soft. Other labels are left out.
 struct Split {
   std::set<int> rigid{}, soft{};
 };
-// By the words of --rigid and --soft; where there are none, by the table of tissues. "none" is the empty
-// list. Throws ComposeError.
+// Splits by the words of --rigid and --soft. Without words the table of tissues decides. The word "none"
+// stands for an empty list. Throws ComposeError.
 Split split_labels(const LabelNames& names, const std::set<int>& present,
                    const std::vector<std::string>& rigid, const std::vector<std::string>& soft);
 
-// Writes a PLY for each rigid label and one volume of the soft ones. `fine` is read at the file's own
-// spacing, `tissue` at that of the lattice; often the same.
+// Writes a PLY file for each rigid label and one volume for the soft labels. `fine` has the file's own
+// spacing, `tissue` that of the lattice. They may be the same volume.
 void add_segmentation(const voxel::LabelVolume& fine, const voxel::LabelVolume& tissue,
                       const LabelNames& names, const Split& split, ComposeFolder& folder, SceneParts& parts,
                       const Progress& progress);
 
-// The tissue of an unsegmented volume: intensities within `range`, or above Otsu's threshold.
+// Adds the tissue of a volume without labels: intensities within `range`, or from Otsu's threshold on.
 void add_intensities(const std::filesystem::path& file, const std::string& name, const Placement& placement,
                      std::optional<std::array<double, 2>> range, std::optional<double> spacing_m,
                      ComposeFolder& folder, SceneParts& parts, const Progress& progress);
 
-// A mesh file (unit: mm), copied.
+// Copies and adds a mesh file (unit: mm).
 void add_mesh(const std::filesystem::path& file, const std::string& name, const Placement& placement,
               ComposeFolder& folder, SceneParts& parts, const Progress& progress);
 
-// The spacing along all axes at which so many voxels of tissue answer readily and are felt where they are
-// drawn; empty: the one they have. `why` says the reason.
+// Spacing along all axes at which `filled` voxels of tissue answer readily and are felt where they are drawn.
+// Empty: the volume's own spacing is good. `why` gets the reason.
 std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::size_t filled, std::string& why);
 
-// Labels that have voxels.
+// The labels that have voxels, with the number of their voxels.
 std::map<int, std::size_t> label_counts(const voxel::LabelVolume& volume);
 
 }  // namespace hybrid

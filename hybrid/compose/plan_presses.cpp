@@ -15,19 +15,20 @@
 namespace hybrid {
 namespace {
 
-constexpr double kPixels = 400.0;      // along the scene's longest side, at most
-constexpr double kSoftDepth = 0.8;     // of the tool's radius, that the hand goes beyond first contact
-constexpr double kBoneDepth = 0.25;    // the same, where nothing gives way
-constexpr double kClearance_m = 0.01;  // between presses, above what lies between; at least a diameter
+constexpr double kPixels = 400.0;    // most pixels along the scene's longest side
+constexpr double kSoftDepth = 0.8;   // depth of a press beyond first contact with tissue, in tool radii
+constexpr double kBoneDepth = 0.25;  // the same on bone, which does not give way
+// Height above the obstacles between two presses; at least the tool's diameter.
+constexpr double kClearance_m = 0.01;
 constexpr double kHold_s = 1.0;
-// From one press to the next the tool strokes over the surface: so deep, with a point of the path so often
-// (both of the tool's radius), except where the surface falls or rises by more than kSteep for a step aside.
+// Between two presses the tool strokes over the surface. Depth and spacing of the path's points are in tool
+// radii. The tool is lifted where the surface falls or rises by more than kSteep times the step.
 constexpr double kStrokeDepth = 0.25, kStrokeStep = 1.5, kSteep = 1.5;
-constexpr double kFastest_m_per_s = 0.06;             // a hand that explores
-constexpr std::size_t kMostRigid = 8, kMostSoft = 8;  // presses of each kind
+constexpr double kFastest_m_per_s = 0.06;             // speed of a hand that explores
+constexpr std::size_t kMostRigid = 8, kMostSoft = 8;  // presses of each kind at most
 constexpr double kNothing = -std::numeric_limits<double>::infinity();
 
-// Something that is pressed once: a family of bones, a mesh, a tissue.
+// Something that is pressed once: a family of bones, a mesh, or a tissue.
 struct Target {
   std::string name;
   bool rigid = false;
@@ -35,12 +36,12 @@ struct Target {
 
 struct View {
   int axis = 0;
-  double sign = 1.0;  // the tool comes from that end of the axis
+  double sign = 1.0;  // the tool comes from this end of the axis
   double weight = 1.0;
   const char* words = "";
 };
-// A body lies on its back, so it is touched from the front, and where it was cut off at the ends of a scan,
-// last.
+// Views of a body, with a weight for each. It lies on its back, so the front comes first. The ends of a scan
+// come last: there the body was cut off.
 constexpr std::array<View, 6> kBodyViews{{{1, -1.0, 1.0, "from the front"},
                                           {0, 1.0, 0.95, "from its left"},
                                           {0, -1.0, 0.95, "from its right"},
@@ -57,10 +58,10 @@ constexpr std::array<View, 6> kPlainViews{{{2, 1.0, 1.0, "from above (+z)"},
 struct Facet {
   std::array<glm::dvec3, 3> corner;
   std::uint32_t target = 0;
-  std::uint32_t detail = 0;  // index into names: which bone, which label
+  std::uint32_t detail = 0;  // index into details: a bone or a label
 };
 
-// All surfaces, and whose each triangle is.
+// The triangles of all surfaces, each with its target and its detail.
 struct Surfaces {
   std::vector<Facet> facets;
   std::vector<Target> targets;
@@ -83,7 +84,7 @@ struct Surfaces {
   }
 };
 
-// The label of the voxel just below a triangle of the tissue's surface (volume frame), or 0.
+// The label of the voxel just below a triangle of the tissue's surface (volume's frame), or 0.
 int label_below(const voxel::LabelVolume& volume, const std::array<glm::dvec3, 3>& t) {
   const glm::dvec3 across = glm::cross(t[1] - t[0], t[2] - t[0]);
   const double length = glm::length(across);
@@ -138,7 +139,7 @@ Surfaces gather(const World& world, const SceneParts& parts) {
   return all;
 }
 
-// Heights along a view over the plane across it, and the centre of a ball at first contact.
+// Height map along a view: heights of the surfaces, and heights of the tool's centre at first contact.
 class HeightMap {
  public:
   HeightMap(const Surfaces& all, const View& view, double radius_m)
@@ -157,10 +158,10 @@ class HeightMap {
 
   struct Spot {
     double score = 0.0;
-    glm::dvec3 contact_m{0.0};  // the tool's centre there
+    glm::dvec3 contact_m{0.0};  // the tool's centre at first contact
     std::uint32_t facet = 0;
   };
-  // For each target the place where most of what a ball touches is its own, and level.
+  // For each target, the place where most of the surface below the ball belongs to the target and is level.
   [[nodiscard]] std::vector<Spot> best(const Surfaces& all) const {
     std::vector<Spot> spots(all.targets.size());
     for (int v = reach_; v < nv_ - reach_; ++v) {
@@ -182,7 +183,7 @@ class HeightMap {
     return spots;
   }
 
-  // The highest that the tool's centre must be to pass between two places.
+  // The least height at which the tool's centre can pass between two places without contact.
   [[nodiscard]] double clear_height(const glm::dvec3& from, const glm::dvec3& to) const {
     const double way = std::max(std::abs(to[u_] - from[u_]), std::abs(to[v_] - from[v_]));
     const int steps = std::max(1, static_cast<int>(std::ceil(2.0 * way / cell_)));
@@ -200,13 +201,13 @@ class HeightMap {
     }
     return most;
   }
-  // The height of the tool's centre that just touches at this place; kNothing where there is nothing.
+  // The height of the tool's centre at first contact at this place; kNothing where there is nothing.
   [[nodiscard]] double touching(const glm::dvec3& p) const {
     const int u = static_cast<int>(std::round((p[u_] - low_[u_]) / cell_));
     const int v = static_cast<int>(std::round((p[v_] - low_[v_]) / cell_));
     return u < 0 || v < 0 || u >= nu_ || v >= nv_ ? kNothing : centre_[index(u, v)];
   }
-  // How far apart two places are across the view.
+  // Distance between two places, measured across the view.
   [[nodiscard]] double across(const glm::dvec3& a, const glm::dvec3& b) const {
     return std::hypot(b[u_] - a[u_], b[v_] - a[v_]);
   }
@@ -233,7 +234,7 @@ class HeightMap {
     facet_[index(u, v)] = facet;
   }
 
-  // Pixels that the triangle covers, and those its corners lie in: none is too small to be seen.
+  // Draws the pixels that the triangle covers, and those of its corners, so that no triangle is lost.
   void draw(const Facet& f, std::uint32_t number) {
     std::array<glm::dvec2, 3> p{};
     std::array<double, 3> h{};
@@ -295,8 +296,8 @@ struct Chosen {
   HeightMap::Spot spot;
 };
 
-// The way from one place of contact to another over the surface, without its ends. Where the surface is steep
-// or missing the tool is lifted over it by `lift_m`.
+// The way over the surface from one place of contact to another, without its ends. Where the surface is steep
+// or missing, the tool is lifted over it by `lift_m`.
 std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, const glm::dvec3& to,
                                double radius_m, double lift_m) {
   const double way = map.across(from, to);
@@ -316,8 +317,8 @@ std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, con
   return points;
 }
 
-// The best places, a few of each kind, in the order in which they are visited: view after view, and within
-// one the nearest next.
+// The best places, at most kMostRigid and kMostSoft, in the order of visits: view after view, and within a
+// view each time the nearest next.
 std::vector<Chosen> choose(const Surfaces& all, const std::vector<HeightMap>& maps) {
   std::vector<Chosen> best(all.targets.size());
   for (std::size_t view = 0; view < maps.size(); ++view) {
@@ -358,7 +359,7 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
   for (const View& view : views) maps.emplace_back(all, view, tool_radius_m);
   const std::vector<Chosen> presses = choose(all, maps);
   const double clearance = std::max(kClearance_m, 2.0 * tool_radius_m);
-  const auto outside = [&](const View& view) {  // as a height along the view
+  const auto outside = [&](const View& view) {  // height along the view
     return std::max(view.sign * all.low[view.axis], view.sign * all.high[view.axis]) + tool_radius_m +
            clearance;
   };
@@ -375,7 +376,7 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
     if (!last) {
       go(above);
     } else if (*last != press.view) {
-      // Round the box: out of the old side, along it until beyond the new one, and in.
+      // Goes round the box: out at the old side, along it until beyond the new side, and in.
       const View& old = views[*last];
       glm::dvec3 p = maps[*last].at_height(path.points.back().at_m, outside(old));
       go(p, 0.0, "off, and round the outside");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A first path through a composed scene: the tool comes from outside and presses what it can reach, one thing
-// after another.
+// A first path through a composed scene. The tool comes from outside and presses the objects that it can
+// reach one after another.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -18,19 +18,19 @@ struct PathPoint {
   std::string comment{};
 };
 struct Press {
-  std::string what, where;  // "liver (label 5)", "from the front"
+  std::string what, where;  // for example "liver (label 5)" and "from the front"
 };
 struct PressPath {
   std::vector<PathPoint> points{};
   std::vector<Press> presses{};
   double speed_m_per_s = 0.05;
-  std::vector<std::string> hidden{};  // what lies where no press reaches it first
+  std::vector<std::string> hidden{};  // targets that no press reaches, because others lie in front of them
 };
 
-// Looks at the scene along each axis, both ways, as heights over a grid, each dilated by the tool: what a
-// ball meets first that comes along the axis, and where. Each kind of bone, mesh and tissue is pressed once,
-// from where most of it faces the tool. From press to press the tool strokes over what lies between, and it
-// goes round the outside from view to view. `built` has the objects of `parts`, in order.
+// Plans a path of presses. Along each axis, in both directions, a height map that is dilated by the tool
+// gives the first contact of a ball that comes along the axis. Each kind of bone, mesh and tissue is pressed
+// once, from the direction that most of it faces. Between two presses the tool strokes over the surface. From
+// one view to the next it moves round the scene's box. `built` has the objects of `parts`, in order.
 PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double tool_radius_m);
 
 }  // namespace hybrid

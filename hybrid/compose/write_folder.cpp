@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::string_view kStaging = ".compose-";  // and the number of the process
 
-// Folders that a killed process left.
+// Removes the folders that killed processes left.
 void remove_stale_staging(const fs::path& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
@@ -72,7 +72,7 @@ ComposeFolder::ComposeFolder(fs::path folder, bool force) : folder_(std::move(fo
 ComposeFolder::~ComposeFolder() {
   std::error_code error;
   fs::remove_all(staging_, error);
-  if (made_) fs::remove(folder_, error);  // only when it is empty
+  if (made_) fs::remove(folder_, error);  // removes only an empty folder
 }
 
 fs::path ComposeFolder::claim(const std::string& name) {
@@ -110,7 +110,7 @@ void ComposeFolder::copy(const fs::path& from, const std::string& name) {
 }
 
 void ComposeFolder::keep() {
-  // The scene comes last: it names all the others.
+  // The scene comes last, because it names all other files.
   std::stable_partition(written_.begin(), written_.end(),
                         [this](const std::string& name) { return folder_ / name != scene(); });
   for (const std::string& name : written_) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The folder that `compose` writes: nothing in it is overwritten unasked. All is written into a folder within
-// it first and put in place at the end, so a scene that fails, or a kill, leaves what was there.
+// The folder that `compose` writes. Existing files are overwritten only if the user asks for it. All files
+// are first written into a subfolder and put in place at the end. So a scene that fails, or a killed process,
+// leaves the folder as it was.
 #pragma once
 
 #include <filesystem>
@@ -11,29 +12,30 @@ namespace hybrid {
 
 class ComposeFolder {
  public:
-  // Makes the folder where it is missing. Throws ComposeError: it holds a scene and `force` is false, it is a
-  // file, or nothing can be written into it.
+  // Makes the folder if it is missing. Throws ComposeError: the folder holds a scene and `force` is false,
+  // the path is a file, or nothing can be written there.
   ComposeFolder(std::filesystem::path folder, bool force);
-  // Removes what was not kept.
+  // Removes the files that keep() did not put in place.
   ~ComposeFolder();
   ComposeFolder(const ComposeFolder&) = delete;
   ComposeFolder& operator=(const ComposeFolder&) = delete;
   ComposeFolder(ComposeFolder&&) = delete;
   ComposeFolder& operator=(ComposeFolder&&) = delete;
 
-  // Where a file of this name is to be written for now. Throws ComposeError: it exists, and `force` is false.
+  // The path to which a file of this name is to be written until keep(). Throws ComposeError if the file
+  // exists and `force` is false.
   std::filesystem::path claim(const std::string& name);
   void write_text(const std::string& name, const std::string& text);
-  // Takes a file away again that write_text() wrote.
+  // Removes a file that write_text() wrote.
   void drop(const std::string& name);
-  // A copy of an input; where it is that very file, it stays as it is.
+  // Copies an input file. If the input is the target file itself, it stays as it is.
   void copy(const std::filesystem::path& from, const std::string& name);
-  // A name for a file or object, of letters, digits, '-', '_' alone and not given out before.
+  // A name for a file or object that was not given out before. It has only letters, digits, '-' and '_'.
   std::string unused_name(const std::string& wanted);
-  // Puts everything in place. Throws ComposeError.
+  // Puts all files in place. Throws ComposeError.
   void keep();
 
-  // Where the files are until keep(), and where the scene is after it.
+  // The folder of the files until keep(), and the path of the scene after it.
   [[nodiscard]] const std::filesystem::path& staging() const { return staging_; }
   [[nodiscard]] std::filesystem::path scene() const { return folder_ / "scene.toml"; }
 

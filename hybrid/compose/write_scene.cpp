@@ -11,10 +11,10 @@
 namespace hybrid {
 namespace {
 
-constexpr double kToolShare = 0.02;  // radius of the tool, of the longest object
-constexpr double kCoupling = 800.0;  // N/m: calm in every grip; see `hybrid stability`
+constexpr double kToolShare = 0.02;  // radius of the tool, as a share of the longest object
+constexpr double kCoupling = 800.0;  // N/m; does not buzz in any grip, see `hybrid stability`
 
-// A text as TOML quotes it. Names and titles come out of files, so any character may be in them.
+// The text as a quoted string of TOML. Names and titles come from files, so any character may occur.
 std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -24,7 +24,7 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-// Text within a comment ends where the line does.
+// The text without control characters: a line break would end the comment that it stands in.
 std::string plain(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; },
@@ -32,8 +32,8 @@ std::string plain(std::string text) {
   return text;
 }
 
-// The name of each label's material: that of the label, as a bare key of TOML. So reports, plots and pictures
-// name organs.
+// Names of materials. Each is the name of its label as a bare key of TOML, so that reports, plots and
+// pictures name organs.
 class MaterialNames {
  public:
   explicit MaterialNames(const SceneParts& parts) {
@@ -44,7 +44,7 @@ class MaterialNames {
     }
   }
   [[nodiscard]] const std::string& of(std::size_t part, int label) const { return of_part_[part].at(label); }
-  // All, in the order of their names.
+  // All materials, in the order of their names.
   [[nodiscard]] const std::map<std::string, const Tissue*>& all() const { return all_; }
 
  private:
@@ -56,7 +56,7 @@ class MaterialNames {
     }
     return key.empty() ? "tissue" : key;
   }
-  // Labels of the same name and tissue share a material.
+  // A name that no other material has. Labels with the same name and tissue share a material.
   std::string unused(const std::string& key, const Tissue* tissue) {
     std::string name = key;
     for (int n = 2; all_.contains(name) && all_.at(name) != tissue; ++n) name = fmt::format("{}-{}", key, n);
@@ -199,10 +199,11 @@ SceneSettings default_settings(const SceneParts& parts) {
   }
   for (const ComposedPart& row : parts.rows)
     longest = std::max({longest, row.size_m.x, row.size_m.y, row.size_m.z});
-  // Tissue of a few kPa is felt under a ball of some millimeters, and a lattice resolves one of two spacings.
+  // A ball of some millimeters radius is needed to feel tissue of a few kPa. A lattice resolves a ball from
+  // two spacings of radius on.
   const double wanted = kToolShare * longest;
   const double radius = spacing > 0.0 ? std::clamp(wanted, 2.0 * spacing, 4.0 * spacing) : wanted;
-  // Two digits: it is read and edited.
+  // Two digits, because a person reads and edits the value.
   const double digit = std::pow(10.0, std::floor(std::log10(radius)) - 1.0);
   settings.tool_radius_m = std::round(radius / digit) * digit;
   settings.coupling_N_per_m = kCoupling;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A composed scene as the text that a person goes on to edit.
+// A composed scene as text that a person can edit.
 #pragma once
 
 #include <string>
@@ -15,13 +15,13 @@ struct SceneSettings {
   double coupling_N_per_m = 800.0;
 };
 
-// By the tissue's lattice where there is one: a contact of four voxels across is felt within a few percent.
-// Else by the size of what is touched.
+// Settings for these parts. With tissue the tool's radius is at least two spacings of its lattice: a contact
+// four voxels wide is felt within a few percent. Otherwise the radius follows from the size of the objects.
 SceneSettings default_settings(const SceneParts& parts);
 
 std::string scene_text(const SceneParts& parts, const SceneSettings& settings, const PressPath& path);
 
-// One rigid primitive and one block of tissue: to begin from where there is no data.
+// A scene with one rigid primitive and one block of tissue, as a start without data.
 std::string starter_scene();
 
 }  // namespace hybrid

@@ -42,7 +42,7 @@ std::vector<unsigned char> read_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-// Drops chunks about brightness (gamma, profile), by which libpng would change the heights.
+// Removes the chunks on brightness (gamma, profile), because libpng would use them to change the heights.
 std::vector<unsigned char> without_colour_space(const std::vector<unsigned char>& png) {
   static constexpr std::array<const char*, 4> kDropped{"gAMA", "cHRM", "sRGB", "iCCP"};
   std::vector<unsigned char> out(png.begin(), png.begin() + kSignature.size());
@@ -52,7 +52,7 @@ std::vector<unsigned char> without_colour_space(const std::vector<unsigned char>
     const std::size_t length = std::size_t{png[at]} << 24U | std::size_t{png[at + 1]} << 16U |
                                std::size_t{png[at + 2]} << 8U | std::size_t{png[at + 3]};
     const std::size_t whole = length + 12;
-    if (whole > png.size() - at) break;  // cut short: the rest is kept, for libpng to report
+    if (whole > png.size() - at) break;  // cut short; the rest is kept, and libpng reports the error
     const auto* type = png.data() + at + 4;
     const bool dropped = std::any_of(kDropped.begin(), kDropped.end(),
                                      [type](const char* name) { return std::memcmp(name, type, 4) == 0; });
@@ -63,7 +63,8 @@ std::vector<unsigned char> without_colour_space(const std::vector<unsigned char>
   return out;
 }
 
-struct Image : png_image {  // the simplified interface: errors by value, no longjmp across C++ frames
+// The simplified interface returns errors as values: no longjmp through C++ frames.
+struct Image : png_image {
   Image() : png_image{} { version = PNG_IMAGE_VERSION; }
   Image(const Image&) = delete;
   Image& operator=(const Image&) = delete;
@@ -80,7 +81,7 @@ std::vector<float> read_grey(Image& image, const std::filesystem::path& file, un
   const png_color black{0, 0, 0};  // colour of transparent pixels
   const bool linear = (format & PNG_FORMAT_FLAG_LINEAR) != 0;
   const bool good = png_image_finish_read(&image, linear ? nullptr : &black, values.data(), 0, nullptr) != 0;
-  // A warning (a wrong checksum, data cut short) means an image with holes, whose heights cannot be trusted.
+  // A warning (a wrong checksum, data cut short) means that pixels are missing, so no height can be trusted.
   if (!good || (image.warning_or_error & PNG_IMAGE_WARNING) != 0)
     refuse(file, "the image is damaged (" + image.why() + "); save it again");
   std::vector<float> grey(values.size());

@@ -15,7 +15,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kTau = 2.0 * std::numbers::pi;
-constexpr int kLinePower = 8;  // of the grid's lines: about a sixth of the period wide
+constexpr int kLinePower = 8;  // exponent for the grid's lines; they are about a sixth of the period wide
 
 void check(const TextureMapping& mapping) {
   if (!(mapping.size_m > 0.0) || !(mapping.height_m > 0.0) || !std::isfinite(mapping.size_m) ||
@@ -44,7 +44,7 @@ HeightSample sample_pattern(TexturePattern pattern, double u, double v) noexcept
       const Wave a = hill(u), b = hill(v);
       return {a.value * b.value, {a.slope * b.value, a.value * b.slope}};
     }
-    case TexturePattern::grid: {  // the larger of both lines, without a crease where they cross
+    case TexturePattern::grid: {  // about the larger of the two lines, without a crease where they cross
       const Wave a = line(u), b = line(v);
       return {1.0 - (1.0 - a.value) * (1.0 - b.value),
               {a.slope * (1.0 - b.value), b.slope * (1.0 - a.value)}};
@@ -68,7 +68,8 @@ Spline spline(double t) noexcept {
           .slope = {-0.5 * s * s, (3.0 * t * t - 4.0 * t) / 2.0, (4.0 * s - 3.0 * s * s) / 2.0, 0.5 * t * t}};
 }
 
-// A coordinate in pixels: its four neighbours, wrapped, and its position between the middle two.
+// A coordinate in pixels: the indices of its four neighbours, wrapped around, and its position between the
+// middle two.
 struct PixelPlace {
   std::array<std::size_t, 4> index{};
   double share = 0.0;
@@ -85,8 +86,8 @@ PixelPlace pixel_place(double unit, int count) noexcept {
   return place;
 }
 
-// The map projected along one axis, upright when seen from its positive end: height and gradient (m) in the
-// body frame.
+// The relief of the map projected along one axis. Seen from the axis's positive end, the map is upright.
+// Height and gradient (m) are in the body's frame.
 Relief relief_along(const HeightTexture& texture, const glm::dvec3& point, glm::length_t axis) noexcept {
   const glm::length_t u = (axis + 1) % 3, v = (axis + 2) % 3;
   const TextureMapping& m = texture.mapping();
@@ -118,7 +119,7 @@ HeightTexture::HeightTexture(TexturePattern pattern, const TextureMapping& mappi
 HeightSample HeightTexture::sample(double u, double v) const noexcept {
   if (!std::isfinite(u) || !std::isfinite(v)) return {};
   if (image_.grey.empty()) return sample_pattern(pattern_, u - std::floor(u), v - std::floor(v));
-  // v counts in periods of u; pixels are square.
+  // u and v are in periods of u. Pixels are square, so v is scaled by the image's shape.
   const double shape = static_cast<double>(image_.width) / static_cast<double>(image_.height);
   const PixelPlace column = pixel_place(u, image_.width), row = pixel_place(v * shape, image_.height);
   const Spline x = spline(column.share), y = spline(row.share);
@@ -151,15 +152,16 @@ Relief relief_at(const HeightTexture& texture, const glm::dvec3& point, const gl
     default:
       break;
   }
-  // Fourth powers: an axis 45° away has half of the weight, one 60° away a ninth. The weights follow the
-  // normal alone, so they are constant on a flat surface and the gradient is exact.
+  // Weights are fourth powers. With the normal between two axes, at 45° each has half of the weight. An axis
+  // 60° from the normal has a tenth. The weights depend only on the normal. So they are constant on a flat
+  // surface, and the gradient is exact there.
   const glm::dvec3 square = normal * normal, weight = square * square;
   const double whole = weight.x + weight.y + weight.z;
   Relief out;
   if (!(whole > 0.0)) return out;
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     const double share = weight[axis] / whole;
-    if (share < 1e-6) continue;  // an axis-aligned face costs one look-up
+    if (share < 1e-6) continue;  // an axis-aligned face then needs one look-up
     const Relief one = relief_along(texture, point, axis);
     out.height_m += share * one.height_m;
     out.gradient += share * one.gradient;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The just noticeable difference (JND) of a force, the unit of every force error of this project: |force -
-// reference| / max(kJndShare * |reference|, floor), with the floor of the device (jnd_floor_N()). Source: the
-// thesis, Table 4 (force at the elbow, 7 %).
+// The just noticeable difference (JND) of a force, in which this project states every force error. An error
+// in JND is |force − reference| / max(kJndShare · |reference|, floor). The floor is that of the device
+// (jnd_floor_N()). Source: the thesis, Table 4 (force at the elbow, 7 %).
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace hybrid {
 
-inline constexpr double kJndShare = 0.07;    // of the reference
+inline constexpr double kJndShare = 0.07;    // share of the reference
 inline constexpr double kJndFloor_N = 0.04;  // floor for a device without friction
 
 // Difference between `force` (N) and `reference` (N) in just noticeable differences.
@@ -21,7 +21,7 @@ inline constexpr double kJndFloor_N = 0.04;  // floor for a device without frict
   return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);
 }
 
-// Angle between two forces (degrees). Exactly 0 for equal ones; neither may be 0.
+// Angle between two forces (degrees). It is exactly 0 for equal forces. Neither may be 0.
 [[nodiscard]] inline double angle_between_deg(const glm::dvec3& a, const glm::dvec3& b) noexcept {
   return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * 180.0 / std::numbers::pi;
 }

@@ -11,16 +11,17 @@ namespace hybrid {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-// Compliance of a shaded proxy across the normals, relative to that along them.
+// Compliance of a shaded proxy across the normals, relative to its compliance along them.
 constexpr double kAside = 1e-4;
-// Of the compliance: least part of a normal outside the span of the others.
+// A normal counts only if its part outside the span of the others has at least this share of the compliance.
 constexpr double kSameNormal = 1e-6;
 
 double largest(const glm::dvec3& v) noexcept {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
 }
 
-// The force that rounding of positions alone can make; a proxy this near to the cone is on the cone.
+// Bound on the force that rounding of positions can cause. A proxy within this distance of the cone counts as
+// on the cone.
 double rounding_N(const glm::dvec3& a, const glm::dvec3& b, const glm::dmat3& metric) noexcept {
   return 8.0 * kEpsilon * (largest(a) + largest(b)) * (metric[0][0] + metric[1][1] + metric[2][2]);
 }
@@ -54,25 +55,26 @@ FrictionStep friction_target(const glm::dvec3& proxy, const glm::dvec3& target, 
   step.normal_N = -glm::dot(pull, normal);
   const glm::dvec3 tangential = pull + step.normal_N * normal;
   step.tangential_N = glm::length(tangential);
-  if (!(static_friction > 0.0) || !(step.normal_N > 0.0)) return step;  // smooth, or leaving the surface
+  // No friction, or the pull leaves the surface.
+  if (!(static_friction > 0.0) || !(step.normal_N > 0.0)) return step;
 
   const double hold = (sliding ? dynamic_friction : static_friction) * step.normal_N;
   if (step.tangential_N <= hold + rounding_N(proxy, target, metric)) {
     step.target = proxy;
     return step;
   }
-  // The slide moves the proxy by C (f_t − μN û), C the compliance A⁻¹ within the plane, and so changes the
-  // normal force by −a of that force, a = n·A⁻¹û / n·A⁻¹n. With N the normal force after it: N (1 − μa) = N₀
-  // − a f_t.
+  // The slide moves the proxy by C (f_t − μN û), where C is the compliance A⁻¹ within the plane. This changes
+  // the normal force by −a times that force, with a = n·A⁻¹û / n·A⁻¹n. Let N be the normal force after the
+  // slide and N₀ that before. Then N (1 − μa) = N₀ − a f_t.
   step.sliding = true;
   const glm::dvec3 along = tangential / step.tangential_N;
   const glm::dmat3 compliance = glm::inverse(metric);
   const glm::dvec3 back = compliance * along;
   const double a = glm::dot(normal, back) / glm::dot(normal, compliance * normal);
   const double room = 1.0 - dynamic_friction * a, pressed = step.normal_N - a * step.tangential_N;
-  if (!(room > 0.0)) {  // friction jams: each slide would press harder than the pull
+  if (!(room > 0.0)) {  // friction jams: a slide would increase the friction by more than it lowers the pull
     step.target = proxy;
-  } else if (pressed > 0.0) {  // else the slide lifts the proxy off, and there is no friction
+  } else if (pressed > 0.0) {  // otherwise the slide lifts the proxy off, and there is no friction
     step.target = target - (dynamic_friction * pressed / room) * back;
   }
   return step;
@@ -149,7 +151,7 @@ glm::dvec3 limit_shaded_normal(const glm::dvec3& shaded, const glm::dvec3& norma
   if (cosine >= least_cosine) return shaded / std::sqrt(square);
   const glm::dvec3 aside = shaded - cosine * normal;
   const double length = glm::length(aside);
-  if (!(length > 1e-6)) return normal;  // the opposite: no direction to turn to
+  if (!(length > 1e-6)) return normal;  // opposite vectors: no direction to turn to
   const double sine = std::sqrt(std::max(0.0, 1.0 - least_cosine * least_cosine));
   return least_cosine * normal + (sine / length) * aside;
 }
@@ -158,7 +160,7 @@ glm::dmat3 shading_metric(const glm::dmat3& metric, std::span<const glm::dvec3> 
   if (shaded_normals.empty()) return metric;
   const glm::dmat3 compliance = glm::inverse(metric);
   const double size = compliance[0][0] + compliance[1][1] + compliance[2][2];
-  glm::dmat3 rest = compliance, along(0.0);  // rest: compliance outside the span of the previous normals
+  glm::dmat3 rest = compliance, along(0.0);  // rest: compliance outside the span of the normals so far
   for (const glm::dvec3& normal : shaded_normals) {
     const glm::dvec3 way = rest * normal;
     const double square = glm::dot(way, normal);

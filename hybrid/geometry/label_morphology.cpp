@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Connected pieces of a label volume, and growing it.
+// Connected pieces of a label volume, and growing of labels.
 #include "hybrid/geometry/surface_nets.h"
 
 #include <algorithm>
@@ -16,12 +16,12 @@ namespace {
 
 using voxel::LabelVolume;
 
-// Runs of wanted voxels along x, joined by union-find if they touch. Memory and time follow the number of
-// runs, and nothing recurses.
+// A run of wanted voxels along x. Runs that touch are joined by union-find. Memory and time follow the number
+// of runs, and there is no recursion.
 struct Run {
   int j = 0, k = 0;
   int first = 0, last = 0;  // inclusive
-  std::size_t piece = 0;    // index of a run of the same piece; its own at the root
+  std::size_t piece = 0;    // index of a run of the same piece; the root has its own index
 };
 
 std::size_t root_of(std::vector<Run>& runs, std::size_t run) {
@@ -32,7 +32,7 @@ std::size_t root_of(std::vector<Run>& runs, std::size_t run) {
   return run;
 }
 
-// Joins the 6-connected pairs of two neighbouring rows, each a range of runs in order along x.
+// Joins the 6-connected runs of two neighbouring rows. Each row is a range of runs in order along x.
 void join_rows(std::vector<Run>& runs, std::size_t a, std::size_t a_end, std::size_t b, std::size_t b_end) {
   while (a < a_end && b < b_end) {
     if (runs[a].first <= runs[b].last && runs[b].first <= runs[a].last) {
@@ -51,7 +51,7 @@ void join_rows(std::vector<Run>& runs, std::size_t a, std::size_t a_end, std::si
 std::vector<Run> find_runs(const LabelVolume& volume, bool empty) {
   std::vector<Run> runs;
   const auto [nx, ny, nz] = volume.dims;
-  std::vector<std::size_t> row_start;  // of each row so far
+  std::vector<std::size_t> row_start;  // index of the first run of each row
   row_start.reserve(static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz) + 1);
   for (int k = 0; k < nz; ++k) {
     for (int j = 0; j < ny; ++j) {
@@ -117,12 +117,12 @@ void keep_largest_piece(LabelVolume& volume, bool fill_cavities) {
 
 namespace {
 
-constexpr double kMostVoxels = 536'870'912.0;  // 2^29, about 3 GB while growing; four 512^3 volumes
+constexpr double kMostVoxels = 536'870'912.0;  // 2^29, four volumes of 512^3; about 3 GB while growing
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
-// One line of the exact squared Euclidean distance transform (Felzenszwalb & Huttenlocher 2012): the lower
-// envelope of the parabolas f(q) + (h·(x - q))². Lines without a finite value stay unchanged; values above
-// `limit` are dropped.
+// One line of the exact squared Euclidean distance transform (Felzenszwalb & Huttenlocher 2012). The result
+// is the lower envelope of the parabolas f(q) + (h·(x − q))². A line without a finite value stays unchanged.
+// Values above `limit` become infinite.
 class DistanceLine {
  public:
   explicit DistanceLine(int longest)
@@ -132,7 +132,7 @@ class DistanceLine {
 
   void transform(float* data, std::size_t stride, int length, double spacing, double limit) {
     const double h2 = spacing * spacing;
-    int last = -1;  // of the envelope
+    int last = -1;  // index of the envelope's last parabola
     for (int q = 0; q < length; ++q) {
       const float sample = data[static_cast<std::size_t>(q) * stride];
       if (sample == kFar) continue;
@@ -163,7 +163,7 @@ class DistanceLine {
  private:
   std::vector<double> value_;
   std::vector<int> vertex_;
-  std::vector<double> from_;  // start of each parabola of the envelope
+  std::vector<double> from_;  // start of each parabola in the envelope
 };
 
 struct Box {
@@ -193,7 +193,7 @@ Box filled_box(const LabelVolume& volume) {
   return box;
 }
 
-// The same labels on a lattice with `before` and `after` more voxels at the ends of each axis.
+// The same labels on a larger lattice: `before` and `after` are the voxels added at the ends of each axis.
 LabelVolume padded(const LabelVolume& volume, const std::array<int, 3>& before,
                    const std::array<int, 3>& after) {
   LabelVolume result;
@@ -219,9 +219,9 @@ LabelVolume padded(const LabelVolume& volume, const std::array<int, 3>& before,
 
 // Sets label 1 on empty voxels within `distance_m` of filled ones, inside `box`.
 void label_near(LabelVolume& volume, const Box& box, double distance_m) {
-  // Lengths in units of the smallest spacing, so that their squares stay within a float's range. The
-  // tolerance is above the 6e-8 of float rounding, which must not decide about a centre exactly at the
-  // distance.
+  // Lengths are in units of the smallest spacing, so that their squares stay within a float's range. The
+  // tolerance of 1e-6 is above the rounding of floats (6e-8), so rounding does not decide about a centre that
+  // is exactly at the distance.
   const double unit_m = std::min({volume.spacing_m.x, volume.spacing_m.y, volume.spacing_m.z});
   const glm::dvec3 h = volume.spacing_m / unit_m;
   const double limit = distance_m / unit_m * (distance_m / unit_m) * (1.0 + 1e-6);

@@ -26,9 +26,9 @@ void check_density(double density) {
 MassProperties mass_of_mesh(const polygon::TriangleMesh& mesh, double density_kg_per_m3) {
   check_density(density_kg_per_m3);
   if (mesh.empty()) throw std::invalid_argument("the mesh has no triangles, so it has no mass");
-  // Integrals over the tetrahedra between each triangle and a point amid the mesh; with a distant origin they
-  // would cancel. For a tetrahedron 0, a, b, c of volume V the integral of x xᵀ is V/20 · (a aᵀ + b bᵀ + c cᵀ
-  // + s sᵀ), s = a + b + c.
+  // Integrals over the tetrahedra between each triangle and the middle of the mesh. With a distant origin
+  // large terms would cancel. For a tetrahedron 0, a, b, c of volume V the integral of x xᵀ is V/20 · (a aᵀ +
+  // b bᵀ + c cᵀ + s sᵀ), with s = a + b + c.
   glm::dvec3 low(1e300), high(-1e300);
   for (const glm::dvec3& v : mesh.vertices) {
     low = glm::min(low, v);
@@ -82,9 +82,9 @@ MassProperties mass_of_capsule(double radius, double length, double density_kg_p
   check_density(density_kg_per_m3);
   const double r2 = radius * radius, pi = glm::pi<double>();
   const double cylinder = density_kg_per_m3 * pi * r2 * length;
-  const double ball = density_kg_per_m3 * 4.0 / 3.0 * pi * r2 * radius;  // the two halves together
+  const double ball = density_kg_per_m3 * 4.0 / 3.0 * pi * r2 * radius;  // mass of both half balls
   const double along = 0.5 * cylinder * r2 + 0.4 * ball * r2;
-  // A half ball's centre of mass lies 3/8 r from its flat face.
+  // The centre of mass of a half ball is 3/8 r from its flat face.
   const double across = cylinder * (r2 / 4.0 + length * length / 12.0) +
                         ball * (0.4 * r2 + length * length / 4.0 + 0.375 * length * radius);
   return {cylinder + ball, glm::dvec3(0.0), diagonal({across, across, along})};

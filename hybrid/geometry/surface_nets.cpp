@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surface of labels. label_morphology.cpp (pieces, growing) and voxelise_mesh.cpp have the other
-// functions of surface_nets.h.
+// The surface of labels. The other functions of surface_nets.h are in label_morphology.cpp (pieces, growing)
+// and voxelise_mesh.cpp.
 #include "hybrid/geometry/surface_nets.h"
 
 #include <algorithm>
@@ -19,13 +19,14 @@ namespace {
 
 using voxel::LabelVolume;
 
-// A cell is the cube between eight voxel centres; corner bit c is x + 2y + 4z. Cell (i, j, k) has voxel (i,
-// j, k) as its corner 0. Cells begin at -1, because outside the lattice is empty. Plain surface nets (Gibson
-// 1998) put one vertex in each boundary cell and so pinch where solids touch along an edge or at a corner.
-// Here a cell has one vertex for each sheet of surface that passes through it (dual marching cubes, Nielson
-// 2004), so that each edge of the result has exactly two triangles and each vertex one fan.
+// A cell is the cube between eight voxel centres. The bit of a corner is x + 2y + 4z. Cell (i, j, k) has
+// voxel (i, j, k) as its corner 0. Cells begin at −1, because the space outside the lattice is empty. Plain
+// surface nets (Gibson 1998) put one vertex into each boundary cell, so the surface pinches where solids
+// touch along an edge or at a corner. Here a cell has one vertex for each sheet of surface that passes
+// through it (dual marching cubes, Nielson 2004). So each edge of the result has exactly two triangles, and
+// each vertex one fan.
 
-// Edge of a cell: along `axis`, at side u of axis + 1 and side v of axis + 2 (modulo 3).
+// Number of a cell's edge along `axis`, on side u of axis + 1 and side v of axis + 2 (modulo 3).
 constexpr int edge_id(int axis, int u, int v) {
   return axis * 4 + u + 2 * v;
 }
@@ -33,7 +34,7 @@ constexpr int corner_at(int axis, int along, int u, int v) {
   return (along << axis) | (u << ((axis + 1) % 3)) | (v << ((axis + 2) % 3));
 }
 
-// Sheet (0..3) of each of the twelve edges of a cell, two bits an edge.
+// The sheet (0..3) of each of a cell's twelve edges, in two bits per edge.
 struct Sheets {
   std::uint32_t edges = 0;
   int count = 0;
@@ -41,8 +42,8 @@ struct Sheets {
 };
 
 struct CellTables {
-  std::array<Sheets, 256> sheets;  // with solids that touch diagonally across a face kept apart
-  // Faces (bit axis*2+side) whose two diagonal sheets are the same in this cell.
+  std::array<Sheets, 256> sheets;  // solids that touch diagonally across a face are kept apart
+  // Faces (bit axis*2+side) whose two diagonals belong to the same sheet in this cell.
   std::array<std::uint8_t, 256> touching{};
 };
 
@@ -50,14 +51,14 @@ bool solid(unsigned corners, int corner) {
   return ((corners >> corner) & 1U) != 0;
 }
 
-// The face's corners in order around it, and the edges between them: edge n lies between corners n and n + 1.
+// A face's corners in order around it, and the edges between them. Edge n is between corners n and n + 1.
 struct Face {
   std::array<int, 4> corners{}, edges{};
 };
 Face face_of(int axis, int side) {
   const int u = (axis + 1) % 3;
   const int v = (axis + 2) % 3;
-  // Along u, edges have sides (v, axis) of axes u+1 = v and u+2 = axis; along v, sides (axis, u).
+  // An edge along u has sides (v, axis), because u + 1 = v and u + 2 = axis. One along v has sides (axis, u).
   return {{corner_at(axis, side, 0, 0), corner_at(axis, side, 1, 0), corner_at(axis, side, 1, 1),
            corner_at(axis, side, 0, 1)},
           {edge_id(u, 0, side), edge_id(v, side, 1), edge_id(u, 1, side), edge_id(v, side, 0)}};
@@ -69,7 +70,7 @@ bool ambiguous(unsigned corners, const Face& face) {
          solid(corners, face.corners[0]) != solid(corners, face.corners[1]);
 }
 
-// Follows the surface from crossed edge to crossed edge through the six faces. On an ambiguous face the two
+// Follows the surface through the six faces, from crossed edge to crossed edge. On an ambiguous face the two
 // solid corners are separated, or joined if `joined` has the face's bit.
 Sheets trace_sheets(unsigned corners, unsigned joined) {
   std::array<int, 12> sheet{};
@@ -82,7 +83,8 @@ Sheets trace_sheets(unsigned corners, unsigned joined) {
   for (int f = 0; f < 6; ++f) {
     const Face face = face_of(f / 2, f % 2);
     if (ambiguous(corners, face)) {
-      const bool around = ((joined >> f) & 1U) == 0;  // the kind of corner that is cut off alone
+      // Corners of this kind (solid or empty) are cut off one by one.
+      const bool around = ((joined >> f) & 1U) == 0;
       for (int n = 0; n < 4; ++n) {
         if (solid(corners, face.corners[n]) == around) unite(face.edges[n], face.edges[(n + 3) % 4]);
       }
@@ -132,7 +134,7 @@ const CellTables& cell_tables() {
 
 using Quad = std::array<std::uint32_t, 4>;
 
-// Vertices in lattice units, with the cell each belongs to, and the quads between them.
+// Vertices in lattice units, the cell of each, and the quads between them.
 struct Net {
   std::vector<glm::dvec3> positions;
   std::vector<std::array<int, 3>> cells;
@@ -149,8 +151,8 @@ class NetBuilder {
     const std::size_t layer = row_length_ * (static_cast<std::size_t>(n[1]) + 1);
     below_.resize(layer);
     here_.resize(layer);
-    // Twice the number for the sides of a full lattice. Unused capacity takes no memory, whereas growing
-    // would take half as much again during the copy, while the labels are in memory too.
+    // Reserves twice the number for the sides of a full lattice. Unused capacity takes no memory. Growing a
+    // vector would take half as much again during the copy, while the labels are in memory too.
     const auto area = [&n](std::size_t a, std::size_t b) {
       return (static_cast<std::size_t>(n[a]) + 1) * (static_cast<std::size_t>(n[b]) + 1);
     };
@@ -171,7 +173,7 @@ class NetBuilder {
     Sheets sheets;
   };
 
-  // A row of labels; null if it lies outside the lattice and is empty.
+  // A row of labels; null if it is outside the lattice and so empty.
   [[nodiscard]] const std::uint8_t* row(int j, int k) const {
     const bool inside = j >= 0 && j < volume_.dims[1] && k >= 0 && k < volume_.dims[2];
     return inside ? &volume_.labels[volume_.index(0, j, k)] : nullptr;
@@ -187,9 +189,9 @@ class NetBuilder {
     return corners;
   }
 
-  // Two cells that share an ambiguous face, each with one sheet through both diagonals, would give an edge
-  // with four triangles. Joining the solids across that face splits the sheet in both cells (Wenger 2013,
-  // 'Isosurfaces', 3.3).
+  // Consider two cells that share an ambiguous face, each with one sheet through both diagonals. They would
+  // give an edge with four triangles. Joining the solids across that face splits the sheet in both cells
+  // (Wenger 2013, 'Isosurfaces', 3.3).
   [[nodiscard]] Sheets sheets_of(unsigned corners, int i, int j, int k) const {
     const CellTables& tables = cell_tables();
     unsigned joined = 0;
@@ -205,7 +207,7 @@ class NetBuilder {
 
   void build_row(int j, int k) {
     const std::array<const std::uint8_t*, 4> rows{row(j, k), row(j + 1, k), row(j, k + 1), row(j + 1, k + 1)};
-    unsigned corners = 0;  // the cell's right corners become the next one's left corners
+    unsigned corners = 0;  // the right corners of a cell become the left corners of the next
     for (int i = -1; i < volume_.dims[0]; ++i) {
       corners = (corners >> 1) & 0x55U;
       if (i + 1 < volume_.dims[0]) {
@@ -226,15 +228,15 @@ class NetBuilder {
              volume_.dims[2], " voxels has more than 4 billion vertices; load it with a larger spacing");
     }
     cell.first_vertex = static_cast<std::uint32_t>(net_.positions.size());
-    // Vertices at cell centres give exactly the voxels' own boundary and volume. Sheets that share a cell
-    // start apart, each a quarter of the way to its own edges, so that no two vertices coincide.
+    // Vertices at cell centres give exactly the boundary and the volume of the voxels. Sheets that share a
+    // cell start apart, each a quarter of the way to its own edges, so that no two vertices coincide.
     for (int sheet = 0; sheet < cell.sheets.count; ++sheet) {
       glm::dvec3 position = glm::dvec3(i, j, k) + 0.5;
       if (cell.sheets.count > 1) position += 0.25 * towards_edges(corners, cell.sheets, sheet);
       net_.positions.push_back(position);
       net_.cells.push_back({i, j, k});
     }
-    // The lattice edges from corner 0: this cell is the last of the four around each.
+    // The lattice edges from corner 0. Each has four cells around it, and this cell is the last of them.
     const std::array<std::size_t, 3> step{1, row_length_, 0};  // along z the step is to the layer below
     for (int axis = 0; axis < 3; ++axis) {
       if (solid(corners, 0) == solid(corners, 1 << axis)) continue;
@@ -248,14 +250,14 @@ class NetBuilder {
         const Cell& other = (lower ? below_ : here_)[index];
         return other.first_vertex + other.sheets.of(edge_id(axis, back_u, back_v));
       };
-      // Counter-clockwise seen from the far end of the edge, which is outside when corner 0 is solid.
+      // Counter-clockwise as seen from the far end of the edge, which is outside if corner 0 is solid.
       Quad quad{vertex(1, 1), vertex(0, 1), vertex(0, 0), vertex(1, 0)};
       if (!solid(corners, 0)) std::swap(quad[1], quad[3]);
       net_.quads.push_back(quad);
     }
   }
 
-  // From the cell's centre to the mean of the midpoints of the edges on a sheet.
+  // Vector from the cell's centre to the mean of the midpoints of a sheet's edges.
   static glm::dvec3 towards_edges(unsigned corners, const Sheets& sheets, int sheet) {
     glm::dvec3 sum(0.0);
     double edges = 0.0;
@@ -274,15 +276,15 @@ class NetBuilder {
 
   const LabelVolume& volume_;
   std::size_t row_length_ = 0;
-  std::vector<Cell> below_, here_;  // one layer of cells each; entries are read only where a cell was added
+  std::vector<Cell> below_, here_;  // one layer of cells each; only entries of cells that were added are read
   Net net_;
 };
 
 // Moves each vertex by `share` of the way to the mean of its neighbours, within its cell. All vertices move
-// at once, so that their order does not matter. Every edge of the net is in two quads: a sum over quads
-// counts each neighbour twice, and its mean is the mean of the neighbours.
+// at once, so their order does not matter. Every edge of the net is in two quads. So a sum over quads counts
+// each neighbour twice, and its mean is the mean of the neighbours.
 void relax(Net& net, double share, std::vector<glm::dvec3>& sum, std::vector<std::uint32_t>& count) {
-  // (unit: spacing) short of the cell's wall, where vertices of two cells could meet.
+  // Unit: spacing. It ends short of the cell's wall, where the vertices of two cells could meet.
   constexpr double kReach = 0.49;
   sum.assign(net.positions.size(), glm::dvec3(0.0));
   count.assign(net.positions.size(), 0);
@@ -299,8 +301,8 @@ void relax(Net& net, double share, std::vector<glm::dvec3>& sum, std::vector<std
   }
 }
 
-// Plain Laplacian passes shrink: a ball of ten voxels' radius loses 10 % of its volume in twenty passes. Each
-// pass therefore shrinks and then expands slightly more, which keeps long waves (Taubin 1995, pass band 0.1).
+// Plain Laplacian passes shrink: a ball of ten voxels' radius loses 10 % of its volume in twenty passes. So
+// each pass shrinks and then expands slightly more, which preserves long waves (Taubin 1995, pass band 0.1).
 void smooth(Net& net, int passes) {
   std::vector<glm::dvec3> sum;
   std::vector<std::uint32_t> count;
@@ -323,7 +325,7 @@ polygon::TriangleMesh surface_from_labels(const LabelVolume& volume, int smoothi
   net.cells = {};
   mesh.triangles.reserve(2 * net.quads.size());
   const auto squared = [](const glm::dvec3& d) { return d.x * d.x + d.y * d.y + d.z * d.z; };
-  for (const Quad& q : net.quads) {  // along the shorter diagonal, which follows ridges
+  for (const Quad& q : net.quads) {  // split along the shorter diagonal, which follows ridges
     const auto& p = mesh.vertices;
     const unsigned turn = squared(p[q[0]] - p[q[2]]) <= squared(p[q[1]] - p[q[3]]) ? 0U : 1U;
     mesh.triangles.push_back({q[turn], q[turn + 1], q[(turn + 2) % 4]});

@@ -18,17 +18,18 @@ namespace {
 using voxel::LabelVolume;
 
 // A mesh prepared for counting crossings along x. Two coordinates of each vertex are rounded to a grid. The
-// grid is fine enough to be invisible (2^-18 of the spacing at 4,096 rows), and coarse enough that the side
-// of an edge on which a row lies is an exact 64-bit integer. A row that meets an edge or vertex exactly is
-// treated as if it lay slightly further along y and far less along z (simulation of simplicity, Edelsbrunner
-// & Mücke 1990). Each row then crosses a closed mesh an even number of times, whatever its shape.
+// grid is so fine that it is invisible (2^-18 of the spacing at 4,096 rows). It is coarse enough that the
+// side of an edge on which a row lies is an exact 64-bit integer. A row that meets an edge or a vertex
+// exactly is treated as if it lay slightly further along y and far less along z (simulation of simplicity,
+// Edelsbrunner & Mücke 1990). So each row crosses a closed mesh an even number of times, whatever its shape.
 struct Crossings {
-  std::vector<double> x;                        // (unit: spacing), per vertex
-  std::vector<std::array<std::int64_t, 2>> yz;  // (unit: spacing / scale), per vertex
+  std::vector<double> x;                        // per vertex; unit: spacing
+  std::vector<std::array<std::int64_t, 2>> yz;  // per vertex; unit: spacing / scale
   std::int64_t scale = 1;
 };
 
-// Gives vertices at the same place the same number, so that separate triangles that match count as closed.
+// Gives vertices at the same position the same number, so that matching triangles without shared vertices
+// count as closed.
 std::vector<std::uint32_t> weld(const std::vector<glm::dvec3>& vertices) {
   std::vector<std::uint32_t> order(vertices.size());
   for (std::size_t v = 0; v < order.size(); ++v) order[v] = static_cast<std::uint32_t>(v);
@@ -60,7 +61,7 @@ void check_mesh(const polygon::TriangleMesh& mesh) {
   }
 }
 
-// Parity along a row is defined if every edge has an even number of triangles.
+// Checks that every edge has an even number of triangles. Then the parity along a row is defined.
 void check_closed(const std::vector<polygon::TriangleIndices>& triangles,
                   const std::vector<glm::dvec3>& vertices) {
   std::vector<std::uint64_t> edges;
@@ -91,7 +92,7 @@ void check_closed(const std::vector<polygon::TriangleIndices>& triangles,
          " m), so inside and outside are not defined; repair its holes first");
 }
 
-// Coincident triangles cancel in pairs, so a million of them cost no more than their sort.
+// Removes coincident triangles in pairs. So a million of them cost no more than their sort.
 void cancel_pairs(std::vector<polygon::TriangleIndices>& triangles) {
   for (auto& t : triangles) std::sort(t.begin(), t.end());
   std::sort(triangles.begin(), triangles.end());
@@ -105,8 +106,8 @@ void cancel_pairs(std::vector<polygon::TriangleIndices>& triangles) {
   triangles.resize(kept);
 }
 
-// A lattice centred on the mesh's box, with a voxel centre half a spacing inside where the box is a whole
-// number of voxels wide.
+// A lattice centred on the mesh's box. Where the box is a whole number of voxels wide, the outermost voxel
+// centres are half a spacing inside.
 LabelVolume lattice_around(const polygon::TriangleMesh& mesh, const glm::dvec3& spacing_m,
                            std::size_t max_voxels) {
   glm::dvec3 low(std::numeric_limits<double>::infinity());
@@ -119,7 +120,7 @@ LabelVolume lattice_around(const polygon::TriangleMesh& mesh, const glm::dvec3& 
   }
   const glm::dvec3 counts = glm::max(glm::ceil((high - low) / spacing_m - 1e-6), glm::dvec3(1.0));
   const double total = counts.x * counts.y * counts.z;
-  constexpr double kLongest = 1e8;  // an axis must leave some bits for the crossings' grid
+  constexpr double kLongest = 1e8;  // a longer axis would leave too few bits for the crossings' grid
   if (!(total <= static_cast<double>(max_voxels)) || std::max({counts.x, counts.y, counts.z}) > kLongest) {
     refuse("voxelising the mesh needs ", counts.x, " x ", counts.y, " x ", counts.z, " = ", total,
            " voxels, above the limit of ", max_voxels, "; use a larger spacing");
@@ -135,7 +136,8 @@ LabelVolume lattice_around(const polygon::TriangleMesh& mesh, const glm::dvec3& 
 
 Crossings prepare(const std::vector<glm::dvec3>& vertices, const LabelVolume& volume) {
   Crossings crossings;
-  // Coordinates run from -1 to the number of rows, and must stay within 2^30 for the products to fit.
+  // Coordinates run from −1 to the number of rows. They must stay within 2^30, so that products fit into 64
+  // bits.
   const std::int64_t rows = std::max(volume.dims[1], volume.dims[2]) + 2LL;
   while (crossings.scale * 2 * rows <= (1LL << 30)) crossings.scale *= 2;
   const auto scale = static_cast<double>(crossings.scale);
@@ -144,7 +146,8 @@ Crossings prepare(const std::vector<glm::dvec3>& vertices, const LabelVolume& vo
   for (const glm::dvec3& p : vertices) {
     const glm::dvec3 at = (p - volume.origin_m) / volume.spacing_m;
     crossings.x.push_back(at.x);
-    // Only a vertex of no triangle can lie outside the lattice; the clamp keeps it an integer.
+    // Only a vertex without triangles can be outside the lattice. Clamping keeps its coordinates valid
+    // integers.
     const glm::dvec3 grid = glm::clamp(at, -1.0, static_cast<double>(rows)) * scale;
     crossings.yz.push_back({std::llround(grid.y), std::llround(grid.z)});
   }
@@ -153,13 +156,13 @@ Crossings prepare(const std::vector<glm::dvec3>& vertices, const LabelVolume& vo
 
 using Point = std::array<std::int64_t, 2>;
 
-// Twice the signed area of (a, b, p): positive when p lies left of a→b.
+// Twice the signed area of (a, b, p). It is positive if p is left of a→b.
 std::int64_t side_of(const Point& a, const Point& b, const Point& p) {
   return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
 }
 
-// Does p, moved slightly along the first axis and far less along the second, lie left of a→b? `side` is
-// side_of.
+// Is p left of a→b after p is moved slightly along the first axis and far less along the second? `side`:
+// side_of(a, b, p).
 bool left_of(std::int64_t side, const Point& a, const Point& b) {
   if (side != 0) return side > 0;
   return b[1] != a[1] ? b[1] < a[1] : b[0] > a[0];
@@ -172,12 +175,12 @@ std::int64_t divide_down(std::int64_t a, std::int64_t b) {
   return a / b - (a % b < 0 ? 1 : 0);
 }
 
-// Flips bit 0 at the first voxel at or after each place where a row crosses the triangle.
+// Flips bit 0 of the first voxel at or behind each point where a row crosses the triangle.
 void mark_triangle(const Crossings& mesh, polygon::TriangleIndices t, LabelVolume& volume) {
   if (side_of(mesh.yz[t[0]], mesh.yz[t[1]], mesh.yz[t[2]]) < 0) std::swap(t[1], t[2]);
   const std::array<Point, 3> p{mesh.yz[t[0]], mesh.yz[t[1]], mesh.yz[t[2]]};
   const std::int64_t area = side_of(p[0], p[1], p[2]);
-  if (area == 0) return;  // seen edge-on: no row in general position crosses it
+  if (area == 0) return;  // edge-on: no row in general position crosses it
   std::array<std::int64_t, 2> low{}, high{};
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto [least, most] = std::minmax({p[0][axis], p[1][axis], p[2][axis]});
@@ -192,7 +195,7 @@ void mark_triangle(const Crossings& mesh, polygon::TriangleIndices t, LabelVolum
                                              side_of(p[0], p[1], row)};
       if (!left_of(side[0], p[1], p[2]) || !left_of(side[1], p[2], p[0]) || !left_of(side[2], p[0], p[1]))
         continue;
-      // From the first vertex, so that a face across x is met exactly at its x.
+      // Interpolates from the first vertex, so that x is exact on a face perpendicular to x.
       const double x = x0 + (static_cast<double>(side[1]) * (mesh.x[t[1]] - x0) +
                              static_cast<double>(side[2]) * (mesh.x[t[2]] - x0)) /
                                 static_cast<double>(area);

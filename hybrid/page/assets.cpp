@@ -3,8 +3,9 @@
 
 namespace hybrid {
 
-// Figures keep a white ground in both schemes, because their colours are chosen for white (Okabe & Ito 2008).
-// Wide figures and tables scroll in a box of their own, so that their text keeps its size on a small screen.
+// Figures keep a white background in both schemes, because their colours are chosen for white (Okabe & Ito
+// 2008). Wide figures and tables scroll in a box of their own, so that their text keeps its size on a small
+// screen.
 std::string_view page_style() {
   return R"css(
 :root { color-scheme: light dark; --ground: #ffffff; --text: #1c2129; --quiet: #535c69; --line: #d5dae1;

@@ -7,7 +7,7 @@
 namespace hybrid {
 
 std::string_view page_style();
-// Sorts a table by a click on its head, and copies it as CSV. Without it the page lacks nothing else.
+// Script that sorts a table by a click on its head and copies the table as CSV. The page works without it.
 std::string_view page_script();
 
 }  // namespace hybrid

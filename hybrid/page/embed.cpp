@@ -22,7 +22,7 @@ void remove_between(std::string& text, std::string_view begin, std::string_view 
   if (to != std::string::npos) text.erase(from, to + end.size() - from);
 }
 
-// The value of an attribute of a start tag; empty where it is missing.
+// The value of an attribute of a start tag; empty if it is missing.
 std::string attribute(std::string_view tag, std::string_view name) {
   const std::string key = " " + std::string(name) + "=\"";
   const std::size_t from = tag.find(key);
@@ -58,7 +58,7 @@ std::string inline_svg(std::string_view svg, std::string_view prefix, std::strin
   const std::string tag(svg.substr(begin, content - begin));
   std::string body(svg.substr(content + 1));
   remove_between(body, "<title>", "</title>");
-  // Quotes of text are escaped, so these are attributes.
+  // Quotes within text are escaped, so each match is an attribute.
   replace_all(body, "id=\"", "id=\"" + std::string(prefix));
   replace_all(body, "=\"url(#", "=\"url(#" + std::string(prefix));
   return "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"" + escaped(label) +

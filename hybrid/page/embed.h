@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Figures and data in the form in which an HTML file holds them.
+// Figures and data in the form in which an HTML file contains them.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -10,11 +10,12 @@ namespace hybrid {
 
 std::string base64(std::string_view bytes);
 
-// The <svg> element of a file of to_svg(), for a page with several: its ids and the references to them get
-// the prefix, its own size and title are left out, and `label` names it for readers who do not see it.
+// Converts a file of to_svg() for a page with several figures, and returns its <svg> element. Ids and
+// references to them get the prefix. Width, height and title are left out. `label` names the figure for
+// readers who do not see it.
 std::string inline_svg(std::string_view svg, std::string_view prefix, std::string_view label);
 
-// JSON that may stand in a <script> element: it has no '<'.
+// JSON for a <script> element, without the character '<'.
 std::string json_for_script(const nlohmann::ordered_json& data);
 
 }  // namespace hybrid

@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-// Letters of a text from which on its column is wider, so that it does not become a tall stack of words.
+// From so many letters on, a text gets a wider column, so that it does not become a tall stack of words.
 constexpr std::size_t kMediumText = 18, kLongText = 48;
 
 std::string width_class(const std::string& text) {

@@ -7,7 +7,7 @@
 namespace hybrid {
 namespace {
 
-// RFC 4180: quoted where a comma, a quote or a line break would be mistaken.
+// A field of a CSV file (RFC 4180). It is quoted if it contains a comma, a quote or a line break.
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string field = "\"";

@@ -15,7 +15,8 @@ constexpr double kOffAxis = std::numeric_limits<double>::quiet_NaN();
 std::vector<double> decade_ticks(double from, double to, int wanted) {
   const int low = static_cast<int>(std::floor(std::log10(from) + 1e-9));
   const int high = static_cast<int>(std::ceil(std::log10(to) - 1e-9));
-  // Few decades have room for numbers between their powers of ten, and many for only some of them.
+  // Numbers between the powers of ten are shown only if there are few decades. With many decades, some powers
+  // are left out too.
   const bool between = 3 * (high - low) <= wanted;
   const int stride = std::max(1, (high - low) / std::max(wanted, 1));
   std::vector<double> ticks;
@@ -37,7 +38,7 @@ std::vector<double> symmetric_ticks(const ValueRange& values, int wanted) {
       if (tick >= values.from && tick <= values.to) ticks.push_back(tick);
     }
   };
-  // Both sides share the ticks that there is room for.
+  // Both signs share the available ticks.
   const bool between = scaled(Scale::symmetric, most) * 4.0 <= wanted;
   for (double power = 1.0; power <= most * (1.0 + 1e-9) && ticks.size() < 64; power *= 10.0) {
     add(power);
@@ -53,7 +54,7 @@ std::vector<double> symmetric_ticks(const ValueRange& values, int wanted) {
 std::string with_commas(std::string digits) {
   const std::size_t begin = digits[0] == '-' ? 1 : 0;
   const std::size_t point = std::min(digits.find('.'), digits.size());
-  // Four digits are read as they are.
+  // Up to four digits need no comma.
   if (point - begin < 5) return digits;
   for (std::size_t at = point; at > begin + 3;) digits.insert(at -= 3, ",");
   return digits;
@@ -91,7 +92,7 @@ double Axis::page(double value) const {
   const double from = scaled(scale_, values_.from), to = scaled(scale_, values_.to);
   if (squeezed_.empty())
     return page_from_ + (scaled(scale_, value) - from) / (to - from) * (page_to_ - page_from_);
-  double out = 0.0;  // squeezed length
+  double out = 0.0;  // total length of the squeezed intervals
   for (const auto& [a, b] : squeezed_) out += b - a;
   const double room = std::abs(page_to_ - page_from_) - kSqueezed_px * static_cast<double>(squeezed_.size());
   const double per_value = room / (to - from - out);
@@ -111,7 +112,7 @@ std::vector<double> Axis::ticks(int wanted) const {
   if (scale_ == Scale::symmetric) return symmetric_ticks(values_, wanted);
   double shown = values_.to - values_.from;
   for (const auto& [a, b] : squeezed_) shown -= b - a;
-  // The pitch is that of an axis without the squeezed intervals.
+  // The pitch of the ticks is that of an axis without the squeezed intervals.
   const std::vector<double> pitch = nice_ticks(0.0, shown, wanted);
   if (pitch.size() < 2) return nice_ticks(values_.from, values_.to, wanted);
   const double step = pitch[1] - pitch[0];

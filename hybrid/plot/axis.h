@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An axis of a panel: the place of a value on the page, and the ticks with their texts.
+// An axis of a panel: the position of a value on the page, and the ticks with their texts.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@
 
 namespace hybrid {
 
-// symmetric: linear from −1 to 1, and each further power of ten is as long as the part from 0 to 1.
+// `symmetric` is linear from −1 to 1. Beyond that each power of ten is as long as the part from 0 to 1.
 enum class Scale : std::uint8_t { linear, logarithmic, symmetric };
 
-using Intervals = std::vector<std::pair<double, double>>;  // from, to; in order
+using Intervals = std::vector<std::pair<double, double>>;  // each has a beginning and an end; in rising order
 
-// True for a value that a figure can show: finite, and its differences do not overflow.
+// Can a figure show this value? It must be finite, and differences of such values must not overflow.
 bool plottable(double v);
 
 struct ValueRange {
@@ -32,16 +32,17 @@ struct ValueRange {
 
 class Axis {
  public:
-  static constexpr double kSqueezed_px = 30.0;  // length of each squeezed interval on the page
+  static constexpr double kSqueezed_px = 30.0;  // length on the page of each squeezed interval
 
   Axis() = default;
-  // The page may run against the values (page_to < page_from). Intervals of a linear axis may be squeezed:
-  // in order, apart, within the values.
+  // page_to < page_from: the axis is reversed. Only intervals of a linear axis may be squeezed. They must be
+  // in order, apart, and within the values.
   Axis(Scale scale, const ValueRange& values, double page_from, double page_to, Intervals squeezed = {});
 
-  // Place on the page (pixels); not finite for a value that has no place, as 0 on a logarithmic axis.
+  // Position on the page (pixels). Not finite for a value without a position, such as 0 on a logarithmic
+  // axis.
   [[nodiscard]] double page(double value) const;
-  // About `wanted` round values on the axis, none of them within a squeezed interval.
+  // About `wanted` round values on the axis, none of them in a squeezed interval.
   [[nodiscard]] std::vector<double> ticks(int wanted) const;
   [[nodiscard]] const ValueRange& values() const { return values_; }
   [[nodiscard]] const Intervals& squeezed() const { return squeezed_; }
@@ -53,18 +54,18 @@ class Axis {
   Intervals squeezed_;
 };
 
-// The coordinate in which an axis of this scale is linear; not finite where the scale has no place.
+// The coordinate in which an axis of this scale is linear. Not finite for a value without a position.
 double scaled(Scale scale, double value);
 
 // Round numbers at a pitch of 1, 2 or 5 · 10^n within [from, to], about `wanted` of them and at most 64.
 std::vector<double> nice_ticks(double from, double to, int wanted);
 
-// Text of a tick, with as many decimals as the pitch needs, and commas between thousands. Never an exponent
-// for what a session measures (10⁻¹² to 10¹⁵).
+// Text of a tick, with as many decimals as the pitch needs, and with commas between thousands. Values that a
+// session measures (10⁻¹² to 10¹⁵) never get an exponent.
 std::string tick_text(double value, double step);
 
-// A value with its unit, the prefix chosen so that the number is short: "10 ns", "1 µs", "0.5 ms" is "500
-// µs".
+// A value with its unit. The prefix is chosen so that the number is short: "10 ns", "1 µs", and "500 µs" for
+// 0.5 ms.
 std::string quantity_text(double value, std::string_view unit);
 
 }  // namespace hybrid

@@ -17,13 +17,14 @@ namespace {
 
 constexpr double kGapInLine = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostDepthPanels = 3;
-constexpr double kTurned_deg = 15.0;      // angles are drawn if some force turns further than this
-constexpr double kReversedShare = 0.1;    // of a contact's largest force: a pull that is drawn with its sign
-constexpr double kShownOutside_m = 1e-3;  // how far outside the object force over depth begins
+constexpr double kTurned_deg = 15.0;  // the panel of angles is drawn if an angle exceeds this
+// Share of a contact's largest force; a pull beyond it is drawn with its sign.
+constexpr double kReversedShare = 0.1;
+constexpr double kShownOutside_m = 1e-3;  // force over depth begins this far outside the object
 constexpr const char* kReferenceColour = "#8a8a8a";
 
-// y at each of `at`, linear between samples; a gap outside the range of x and beside samples that are not
-// finite.
+// y at each x of `at`, linear between samples. There are gaps outside the range of x and beside samples that
+// are not finite.
 std::vector<double> sampled(std::span<const double> x, std::span<const double> y,
                             std::span<const double> at) {
   std::vector<double> out;
@@ -57,7 +58,7 @@ Course course_of(const ComparedModel& model) {
   return course;
 }
 
-// The model's force at the reference's times.
+// The model's force at the reference's times, linear between samples.
 std::vector<glm::dvec3> at_times(const Course& model, const std::vector<double>& t_s) {
   std::vector<glm::dvec3> out(t_s.size());
   std::vector<double> own(model.force_N.size());
@@ -133,7 +134,7 @@ class ComparePlot {
     return next != contacts_.end() && t_s >= next->from_s ? &*next : nullptr;
   }
 
-  // True if the model pushes against the direction of the reference's largest force in a contact.
+  // Does the model in some contact push opposite to the reference's largest force there?
   bool reverses(const ComparedModel& model) const {
     return std::ranges::any_of(model.rows, [&](const TraceRow& row) {
       const Contact* const contact = contact_at(row.t_s);
@@ -153,7 +154,7 @@ class ComparePlot {
     return out;
   }
 
-  // Force over time; for all but the reference also its difference.
+  // Adds the panel of force over time. For all but the reference also adds the panel of the difference.
   void add_model(PanelGroup& group, std::size_t m) const {
     const ComparedModel& model = models_[m];
     const Course& reference = courses_[options_.reference];
@@ -187,8 +188,8 @@ class ComparePlot {
     group.panels.push_back(std::move(difference));
   }
 
-  // Angle of each model's force to the reference's force, at the reference's ticks. A model with its own
-  // times contributes its last tick before. No series if no model turns far enough.
+  // Angle of each model's force to the reference's force, at the reference's ticks. Of a model with its own
+  // times, the last tick before counts. There is no series if all angles are small.
   Panel direction_panel() const {
     Panel panel;
     panel.title = "Direction: angle to the force of " + reference_.name;

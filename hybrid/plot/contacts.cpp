@@ -8,9 +8,9 @@
 namespace hybrid {
 namespace {
 
-constexpr double kLiftOff_s = 0.05;     // a contact goes on if the tool was in the air no longer
-constexpr double kKeptShare = 0.03;     // of the whole time: kept before and after each contact
-constexpr double kLongShare = 0.08;     // of the whole time: a squeezed stretch is at least this long
+constexpr double kLiftOff_s = 0.05;     // a contact continues if the tool lifted off no longer than this
+constexpr double kKeptShare = 0.03;     // share of the whole time that stays before and after each contact
+constexpr double kLongShare = 0.08;     // share of the whole time; shorter stretches are not squeezed
 constexpr double kLeastForce_N = 1e-9;  // a smaller force has no direction
 
 }  // namespace

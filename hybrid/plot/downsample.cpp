@@ -43,7 +43,7 @@ std::vector<PlotPoint> downsample_columns(std::span<const double> x, std::span<c
       ++i;
       continue;
     }
-    // One run of finite samples in the same column.
+    // A run of finite samples in one column.
     const std::size_t column = column_of(x[i]);
     const std::size_t first = i;
     std::size_t lowest = i;
@@ -63,11 +63,11 @@ std::vector<PlotPoint> downsample_columns(std::span<const double> x, std::span<c
 
 std::vector<PlotPoint> downsample_path(std::span<const PlotPoint> path, double tolerance, std::size_t most) {
   std::vector<PlotPoint> out;
-  // Each doubling at least halves the points of a dense path. A drawing is some thousand units wide, so the
-  // loop ends.
+  // Each doubling about halves the points of a dense path. A drawing is some thousand units wide, so the loop
+  // ends.
   for (int round = 0; round < 40; ++round, tolerance *= 2.0) {
     out.clear();
-    PlotPoint skipped{kGap, kGap};  // last point left out, so that the ends of lines keep their place
+    PlotPoint skipped{kGap, kGap};  // last point that was left out; it is kept if a line ends there
     for (const PlotPoint& point : path) {
       if (is_gap(point)) {
         if (!is_gap(skipped)) out.push_back(skipped);
@@ -86,7 +86,7 @@ std::vector<PlotPoint> downsample_path(std::span<const PlotPoint> path, double t
     if (!is_gap(skipped)) out.push_back(skipped);
     if (out.size() <= most) return out;
   }
-  out.resize(std::min(out.size(), most));  // only gaps are left, which cannot be thinned
+  out.resize(std::min(out.size(), most));  // only gaps are left; they cannot be thinned
   return out;
 }
 

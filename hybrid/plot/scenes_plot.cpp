@@ -51,7 +51,7 @@ Figure scenes_figure(std::span<const ComparedModel> scenes, const std::string& t
     Series line;
     line.name = scenes[s].name + (is_reference ? " (reference)" : "");
     line.colour = series_colour(s);
-    // The reference is drawn first and wide, so that a curve on it leaves both visible.
+    // The reference is drawn first and wide, so that both curves stay visible where they coincide.
     line.width = is_reference ? 3.0 : 1.5;
     line.dashed = s >= kSeriesColours;
     for (const TraceRow& row : scenes[s].rows) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The figure of whole scenes along one motion: all forces over time, and below them the difference of each
+// The figure of whole scenes along one motion: all forces over time, and below them each scene's difference
 // from the reference.
 #pragma once
 
@@ -11,11 +11,11 @@
 
 namespace hybrid {
 
-// The scenes have ticks at the same times. The difference is that of the force vectors in JND, negative where
-// the scene's force is the smaller one. Throws std::invalid_argument: the reference is no scene.
+// All scenes must have ticks at the same times. The difference is that of the force vectors in JND, negative
+// where the scene's force is the smaller one. Throws std::invalid_argument if the reference is no scene.
 Figure scenes_figure(std::span<const ComparedModel> scenes, const std::string& title,
                      const ComparePlotOptions& options = {});
-// The same as a file. Throws also std::runtime_error: file not writable.
+// Writes the figure as a file. Also throws std::runtime_error if the file is not writable.
 void save_scenes_plot(const std::filesystem::path& svg, std::span<const ComparedModel> scenes,
                       const std::string& title, const ComparePlotOptions& options = {});
 

@@ -15,7 +15,7 @@ namespace hybrid {
 namespace {
 
 constexpr const char* kTouchedColour = "#eaf2e3";
-constexpr std::size_t kMostContacts = 6;  // lines of force over depth
+constexpr std::size_t kMostContacts = 6;  // lines of force over depth at most
 constexpr std::size_t kLookUpEvery = 10;  // ticks between two look-ups of the material beneath the tool
 constexpr std::uint8_t kNoPart = 255;
 
@@ -26,7 +26,7 @@ std::vector<double> times_of(std::span<const TraceRow> rows) {
   return t;
 }
 
-// "largest force 2.31 N at 0.412 s", or a text for no force.
+// For example "largest force 2.31 N at 0.412 s"; another text if there is no finite force.
 std::string largest(std::span<const TraceRow> rows) {
   double most = -1.0;
   double when = 0.0;
@@ -47,7 +47,8 @@ std::string largest(std::span<const TraceRow> rows) {
   return words;
 }
 
-// All objects from the 32nd on share the last bit: those touch while they have a force.
+// Does the object touch in this row? All objects from the 32nd on share the last bit. They count as touching
+// while they have a force.
 bool touches(std::span<const TraceRow> rows, const PlottedObject& object, std::size_t number,
              std::size_t row) {
   constexpr std::size_t shared = 31;
@@ -56,13 +57,13 @@ bool touches(std::span<const TraceRow> rows, const PlottedObject& object, std::s
   return object.force_N[row] > 0.0;
 }
 
-// What the figure names: an object, or a part of one, that the tool touched.
+// A thing that the figure names: an object that the tool touched, or a part of one.
 struct Touched {
   std::string name;
   bool soft = false;
   Intervals intervals{};
   std::vector<double> force_N{};  // [row]; empty: not recorded
-  double felt_Ns = 0.0;           // force over time; without forces: the time of contact
+  double felt_Ns = 0.0;           // force integrated over time; if there are no forces, the time of contact
 };
 
 Touched touched_thing(std::span<const TraceRow> rows, const PlottedObject& object, std::size_t number,
@@ -86,7 +87,7 @@ Touched touched_thing(std::span<const TraceRow> rows, const PlottedObject& objec
   return thing;
 }
 
-// The most felt one first; empty where nothing was touched.
+// The things that were touched, the one felt most first.
 std::vector<Touched> touched_things(std::span<const TraceRow> rows, std::span<const PlottedObject> objects,
                                     std::size_t& untouched) {
   std::vector<Touched> things;
@@ -126,7 +127,7 @@ Panel force_panel(std::span<const TraceRow> rows, const std::vector<double>& t,
   };
   if (count(false) > 0) panel.series.push_back({"rigid objects", t, std::move(rigid), series_colour(0)});
   if (count(true) > 0) panel.series.push_back({"soft objects", t, std::move(soft), series_colour(1)});
-  // Dashed lines of their own, if a kind has more than one: they are parts of the sums above.
+  // If there are several things of a kind, each gets a dashed line. Its force is a part of the sums above.
   std::size_t colour = 2;
   for (const Touched& thing : things) {
     if (thing.force_N.empty() || count(thing.soft) < 2 || colour >= kSeriesColours) continue;
@@ -150,7 +151,7 @@ Panel contact_panel(std::span<const Touched> things, std::size_t untouched) {
   return panel;
 }
 
-// Clearance of tissue to rigid objects and to other tissue. No series if nothing comes near.
+// Clearance of tissue to rigid objects and to other tissue. There is no series if nothing comes near.
 Panel clearance_panel(const ClearanceCourse& near) {
   Panel panel;
   panel.title = "Between objects (0: they touch; below: they overlap)";
@@ -175,7 +176,7 @@ Panel clearance_panel(const ClearanceCourse& near) {
   return panel;
 }
 
-// No series if no tick was timed.
+// Times of the ticks. There is no series if no tick was timed.
 Panel tick_time_panel(std::span<const TraceRow> rows, const std::vector<double>& t, double period_s) {
   Panel panel;
   panel.title = "Time that each tick takes";
@@ -191,12 +192,12 @@ Panel tick_time_panel(std::span<const TraceRow> rows, const std::vector<double>&
   return panel;
 }
 
-// What a contact is called: the thing that was felt most in it.
+// The name of a contact: that of the thing that was felt most in it.
 std::string name_in(const Contact& contact, std::span<const Touched> things, std::span<const TraceRow> rows) {
   std::string name;
   double most = -1.0;
   for (const Touched& thing : things) {
-    double felt = 0.0;  // force, or without forces time: sums that only things of one trace are compared by
+    double felt = 0.0;  // sum of forces, or the time of contact if the trace has no forces
     for (std::size_t i = 0; i < thing.force_N.size(); ++i) {
       if (rows[i].t_s >= contact.from_s && rows[i].t_s <= contact.to_s) felt += thing.force_N[i];
     }
@@ -211,7 +212,7 @@ std::string name_in(const Contact& contact, std::span<const Touched> things, std
   return name;
 }
 
-// Force over depth. No series without contacts.
+// Force over depth. There is no series without contacts.
 Panel depth_panel(std::span<const TraceRow> rows, std::span<const Touched> things, const Intervals& any) {
   Panel panel;
   panel.title = "Force over depth, one line for each contact";

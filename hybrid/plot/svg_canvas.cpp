@@ -28,7 +28,7 @@ std::string escaped(std::string_view text) {
         out += "&apos;";
         break;
       default:
-        // XML has no way to write most control characters.
+        // XML cannot express most control characters.
         out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
     }
   }

@@ -15,7 +15,7 @@ std::string escaped(std::string_view text);
 // A coordinate with at most one decimal, clamped to five digits.
 std::string fixed(double v);
 
-// The body of an SVG file. `style` and `more` are attributes, and are not escaped.
+// The body of an SVG file. `style` and `more` are attributes. They are not escaped.
 class Svg {
  public:
   std::string body;

@@ -16,24 +16,24 @@
 namespace hybrid {
 namespace {
 
-constexpr double letter = 6.4;          // mean width of a letter at 12 pixels, on the wide side
-constexpr double most_points = 18'000;  // of all lines together; about 12 bytes each
+constexpr double letter = 6.4;          // pixels; upper estimate of a letter's mean width at font size 12
+constexpr double most_points = 18'000;  // most points of all lines together; a point takes about 12 bytes
 constexpr double lane_height = 22.0;
 constexpr std::size_t most_lanes = 24;
-constexpr double kTitleLetter = 7.9;  // mean width of a bold letter at 13 pixels, on the wide side
+constexpr double kTitleLetter = 7.9;  // pixels; upper estimate of a bold letter's mean width at font size 13
 constexpr double kEntryGap = 6.0;     // between entries of a legend (pixels)
-constexpr double kRounding = 1e-6;    // pixels: an end of a line is not beyond the end of its axis
-constexpr int kTicks = 10;            // of an x axis, about
+constexpr double kRounding = 1e-6;    // pixels; a line may end so far beyond the end of its axis
+constexpr int kTicks = 10;            // ticks of an x axis, about
 constexpr double kTickGap = 8.0;      // between the axis and the text of a tick (pixels)
 constexpr const char* kSqueezedColour = "#ececec";
 
-// Maps a panel's data to the page.
+// The axes of a panel, which map its data to the page.
 struct Axes {
   double left, top, width, height;
   Axis x, y;
 };
 
-// Intervals on the page (pixels): neighbours nearer than half a pixel are merged, and intervals are cut to
+// Intervals on the page (pixels). Neighbours nearer than half a pixel are merged, and intervals are cut to
 // the axes.
 Intervals page_intervals(const Intervals& intervals, const Axes& axes) {
   Intervals out;
@@ -74,7 +74,7 @@ std::string path_of(const std::vector<PlotPoint>& page) {
   return d;
 }
 
-// Places of values on the page; not finite where there is none.
+// Positions of values on the page; not finite for a value without one.
 std::vector<double> on_page(const std::vector<double>& values, std::size_t count, const Axis& axis) {
   std::vector<double> page(count);
   for (std::size_t i = 0; i < count; ++i) page[i] = axis.page(values[i]);
@@ -164,7 +164,7 @@ double draw_legend(Svg& svg, const std::vector<LegendEntry>& entries, double lef
   return entries.empty() ? 0.0 : y - top + 20.0;
 }
 
-// A tick alone has no pitch: its own size is taken for it.
+// Texts of the ticks. A single tick has no pitch, so its own size serves as the pitch.
 std::vector<std::string> tick_texts(const std::vector<double>& ticks, Scale scale, const std::string& unit) {
   const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 0.0;
   std::vector<std::string> texts;
@@ -178,7 +178,7 @@ std::vector<std::string> tick_texts(const std::vector<double>& ticks, Scale scal
   return texts;
 }
 
-// The y axis that shows all of a panel, with a margin.
+// The y axis that shows all values of a panel, with a margin.
 Axis choose_y(const Panel& panel, double top, double height) {
   ValueRange y;  // in the coordinate in which the axis is linear
   const auto add = [&](double v) { y.add(scaled(panel.y_scale, v)); };
@@ -215,7 +215,7 @@ void draw_lanes(Svg& svg, const Panel& panel, const Axes& axes, std::size_t show
   }
 }
 
-// Above the line; below it where the top of the panel is too near.
+// Position of a line's label: above the line, or below it if the top of the panel is too near.
 double label_y(const Axes& axes, double value) {
   const double y = axes.y.page(value);
   return y - axes.top < 16.0 ? y + 13.0 : y - 4.0;
@@ -308,11 +308,11 @@ ValueRange x_range(const PanelGroup& group) {
   return range;
 }
 
-// The texts below a group: numbers, and the length of each squeezed interval.
+// Draws the texts below a group: numbers, and the length of each squeezed interval.
 void draw_x_ticks(Svg& svg, const PanelGroup& group, const Axis& x, double y) {
   const std::vector<double> ticks = x.ticks(kTicks);
   const std::vector<std::string> texts = tick_texts(ticks, group.x_scale, "");
-  Intervals taken;  // on the page
+  Intervals taken;  // intervals of the page that have texts
   for (const auto& [from, to] : x.squeezed()) {
     const double middle = 0.5 * (x.page(from) + x.page(to));
     const std::string words = "+" + tick_text(to - from, 0.1);
@@ -365,7 +365,8 @@ std::string to_svg(const Figure& figure) {
       double legend_left = left;
       if (!panel.title.empty()) {
         svg.text(left, y + 12.0, panel.title, "class=\"h2\"");
-        // The legend stands beside the title if there is room, and the title directly above its axes.
+        // The legend is beside the title if there is room for it. Otherwise it is between the title and the
+        // axes.
         const double beside = left + kTitleLetter * static_cast<double>(letters(panel.title)) + 24.0;
         double needed = 0.0;
         for (const LegendEntry& e : legend) needed += entry_width(e) + kEntryGap;

@@ -20,7 +20,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kSettlingRounds = 60;  // of the relaxation plot
+constexpr int kSettlingRounds = 60;  // rounds of relaxation in the plot
 
 std::vector<bench::Engine> engines_of(const std::vector<std::string>& names) {
   std::vector<bench::Engine> engines;
@@ -31,7 +31,7 @@ std::vector<bench::Engine> engines_of(const std::vector<std::string>& names) {
   return engines;
 }
 
-// The product's own figures in one table.
+// The results of the product itself in one line.
 std::string summary(const std::vector<bench::RigidRow>& rows) {
   std::size_t runs = 0, inside = 0, pops = 0, lost = 0;
   double worst = 0.0;
@@ -50,7 +50,7 @@ std::string summary(const std::vector<bench::RigidRow>& rows) {
       runs, inside, pops, 1e6 * worst, lost);
 }
 
-// The chosen names that belong to a suite.
+// The chosen names that the suite has.
 std::vector<std::string> chosen_in_suite(const std::vector<std::string>& chosen,
                                          const std::vector<std::string>& suite) {
   std::vector<std::string> result;
@@ -96,7 +96,7 @@ void rigid_suite(const BenchCommand& command, std::FILE* words, nlohmann::ordere
     fmt::print(words, "\nhybrid's own times, and how many times as long the baselines took:\n{}", ratios);
 }
 
-// `growth` receives the growth of work with size.
+// `growth`: gets the growth of work with relative deformation.
 void soft_suite(const BenchCommand& command, std::FILE* words, Outputs& outputs, nlohmann::ordered_json& json,
                 nlohmann::ordered_json& growth) {
   bench::SoftBenchOptions options{.quick = command.quick,
@@ -131,7 +131,8 @@ void soft_suite(const BenchCommand& command, std::FILE* words, Outputs& outputs,
   });
 }
 
-// With all suites, each plot gets its suite's name, because several suites write one.
+// The file of the suite's plot. With all suites its name gets the suite's name, because several suites write
+// a plot.
 std::filesystem::path occupancy_plot(const BenchCommand& command) {
   if (command.plot.empty() || command.suite != "all") return command.plot;
   std::filesystem::path plot = command.plot;
@@ -182,7 +183,7 @@ void threads_suite(const BenchCommand& command, std::FILE* words, nlohmann::orde
   for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
 }
 
-// Whether a suite has anything to do: in "all" it is left out if every chosen name belongs to other suites.
+// Does the suite have anything to do? In "all" it is left out if every chosen name belongs to other suites.
 bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
               const std::vector<std::string>& engines) {
   return (command.only.empty() || !chosen_in_suite(command.only, cases).empty()) &&
@@ -252,7 +253,8 @@ std::string bench_mesh_error(const std::string& name) {
 
 namespace {
 
-// Runs what was asked for into `report`, row by row. Throws std::invalid_argument: there is nothing to run.
+// Runs the chosen suites and adds their rows to `report`, row by row. Throws std::invalid_argument if there
+// is nothing to run.
 void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered_json& report) {
   std::FILE* words = outputs.words();
   nlohmann::ordered_json& suites = report["suites"] = nlohmann::ordered_json::object();
@@ -291,7 +293,7 @@ int run_bench(const BenchCommand& command) {
   outputs.ask_json(command.json);
   nlohmann::ordered_json report = report_head("bench");
   report["quick"] = command.quick;
-  const device::StopOnSignal stop;  // rows that are done are kept
+  const device::StopOnSignal stop;  // after a signal, finished rows are kept
   int signal = 0;
   try {
     run_suites(command, outputs, report);

@@ -55,7 +55,7 @@ void add_finding(Json& file, const polygon::Finding& f) {
   file["findings"].push_back(to_json(f));
 }
 
-// The text of a mesh's finding is worded to follow its count.
+// A mesh's finding with its count before the text, which is worded to follow it.
 Json counted(polygon::Finding f) {
   f.text = fmt::format("{} {}", f.count, f.text);
   return to_json(f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The program's commands, without the spelling of their options (main.cpp). Each returns the exit status and
-// throws on a refused input.
+// The program's commands. main.cpp spells their options. Each command returns the exit status, and throws if
+// an input is refused.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@
 
 namespace hybrid {
 
-// A report page: the folder that it is written into, and the command line that makes it again.
+// A report page: the folder into which it is written, and the command line that makes it again.
 struct ReportRequest {
   std::filesystem::path folder;  // empty: no page
   std::string command;
@@ -26,7 +26,7 @@ struct RunCommand {
   std::optional<double> seconds;
   bool realtime = false;
   std::string device;       // replaces the scene's device; empty: the scene's
-  int samples = 1'000'000;  // more than a session has
+  int samples = 1'000'000;  // ticks whose force is compared with a slow run; by default all
   std::uint64_t start_ticks = 0;
   std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
@@ -46,7 +46,7 @@ struct CheckCommand {
   std::vector<std::filesystem::path> files;
   bool deep = false;
   bool repair = false;   // also report the changes that `repair = true` would make
-  double unit_m = 1e-3;  // of mesh files, as scenes and `compose` have it
+  double unit_m = 1e-3;  // length unit of mesh files; the default is that of scenes and `compose`
   std::string json;
 };
 int check(const CheckCommand& command);
@@ -58,14 +58,14 @@ struct ComposeCommand {
 int compose(const ComposeCommand& command);
 
 struct DevicesCommand {
-  bool calibrate = false;  // take the present pose of the arm as the calibration pose
+  bool calibrate = false;  // take the arm's present pose as the calibration pose
   std::string json;
 };
 int devices(const DevicesCommand& command);
 
 struct CompareCommand {
-  std::vector<std::filesystem::path> scenes;  // one: an object of it in several ways; more: whole scenes
-  int samples = 1'000'000;                    // of whole scenes, as of `run`
+  std::vector<std::filesystem::path> scenes;  // one: an object of it by several models; more: whole scenes
+  int samples = 1'000'000;                    // only of whole scenes; as of `run`
   std::string object;                         // empty: the first suitable object
   MeasuredOptions measured;                   // empty file: no measurement
   std::filesystem::path plot;
@@ -74,51 +74,51 @@ struct CompareCommand {
   std::string json;
 };
 int compare(const CompareCommand& command);
-int compare_whole_scenes(const CompareCommand& command);  // two or more
+int compare_whole_scenes(const CompareCommand& command);  // with two or more scenes
 
 struct TuneCommand {
   std::filesystem::path scene;
-  std::optional<double> budget_us;  // of a tick's p99.9; default: half of the device's period
+  std::optional<double> budget_us;  // limit for the p99.9 of the tick; default: half of the device's period
   double error_jnd = 1.0;
   bool quick = false;
   bool apply = false;                 // write the choice into the scene's file
-  std::filesystem::path out;          // or into this one, in the same folder; empty: neither
+  std::filesystem::path out;          // write the choice into this file in the scene's folder; empty: do not
   std::filesystem::path plot, cache;  // empty: not written
   std::string json;
-  std::string command_line;  // as it was typed, for the report
+  std::string command_line;  // as it was typed; for the report
 };
 int tune_scene(const TuneCommand& command);
 
 struct BenchCommand {
-  std::string suite;  // of bench_suites(), or "all"
+  std::string suite;  // a name of bench_suites(), or "all"
   bool quick = false, every_tick = false;
-  std::vector<std::string> only, meshes, engines;  // empty: the suite's own choice
-  double mesh_unit_m = 1e-3;                       // of rigid: of mesh files
-  std::vector<int> sizes;                          // of soft: voxels an edge; empty: its own choice
-  std::vector<std::size_t> cells;                  // of occupancy: occupied cells; empty: its own choice
-  std::vector<std::filesystem::path> scenes;       // of threads
-  std::optional<double> session_s;  // of soft: simulated time of a session; of threads: real time of a load
-  std::filesystem::path trace;      // folder; empty: none
-  std::filesystem::path plot;       // of soft: relaxation round by round; of occupancy: times; empty: none
+  std::vector<std::string> only, meshes, engines;  // empty: the suite chooses
+  double mesh_unit_m = 1e-3;                       // rigid: length unit of mesh files
+  std::vector<int> sizes;                          // soft: voxels along an edge; empty: the suite chooses
+  std::vector<std::size_t> cells;                  // occupancy: occupied cells; empty: the suite chooses
+  std::vector<std::filesystem::path> scenes;       // threads: the scenes
+  std::optional<double> session_s;  // soft: simulated time of a session; threads: real time of a load
+  std::filesystem::path trace;      // folder of traces; empty: none
+  std::filesystem::path plot;       // soft: relaxation per round; occupancy: times; empty: none
   std::string json;
 };
 int run_bench(const BenchCommand& command);
-// The names that may be chosen, so that a wrong name is refused with the valid ones.
+// The names that may be chosen. A wrong name is refused with the list of valid ones.
 const std::vector<std::string>& bench_suites();
 std::vector<std::string> bench_parts();  // paths of rigid, cases of soft and occupancy
 std::vector<std::string> bench_engines();
-std::string bench_mesh_error(const std::string& name);  // empty: a mesh's name, or a path
-// The suites in which each option has an effect. In "all" each has one; options of all suites are left out.
+std::string bench_mesh_error(const std::string& name);  // empty if the name is a mesh's or a path
+// The suites in which each option has an effect. Options that have an effect in all suites are not listed.
 struct BenchOption {
   const char* name;
   std::vector<std::string> suites;
 };
 const std::vector<BenchOption>& bench_options();
 
-// `hybrid bench compare`: changes between reports of `hybrid bench`. Neither side may be empty.
+// `hybrid bench compare`: changes between reports of `hybrid bench`. There must be reports on both sides.
 struct BenchCompareCommand {
   std::vector<std::filesystem::path> olds, news;
-  bool all = false;  // list every figure
+  bool all = false;  // list every figure, not only the first
   std::string json;
 };
 int bench_compare(const BenchCompareCommand& command);
@@ -131,13 +131,13 @@ struct StabilityCommand {
 };
 int stability(const StabilityCommand& command);
 // `hybrid stability SCENE --extremes` and `--fuzz-ticks N`: the suites of extremes.h and fuzz_ticks.h. The
-// exit status is 1 if an invariant was violated; the report gives the details.
+// exit status is 1 if an invariant was violated. The report gives the details.
 struct ExtremesCommand {
   std::filesystem::path scene;
   bool table = true;
   bool quick = false;
   std::uint64_t fuzz_ticks = 0, seed = 1;  // 0: none
-  bool async_relaxation = false;           // of fuzz_ticks
+  bool async_relaxation = false;           // only for fuzz_ticks
   std::string json;
 };
 int extremes(const ExtremesCommand& command);
@@ -147,17 +147,16 @@ struct ValidateCommand {
   ReportRequest report;
   std::string json;
 };
-int validate(
-    const ValidateCommand& command);  // the exit status is 1 if a case that is stated to hold does not
+int validate(const ValidateCommand& command);  // the exit status is 1 if a stated case does not hold
 
 struct ViewCommand {
   std::filesystem::path scene;
   std::optional<std::uint64_t>
-      frames;  // the window closes after this many; each is written to `out` if that is given
+      frames;  // number of frames before the window closes; each is written to `out` if that is given
   std::filesystem::path out;
-  std::filesystem::path drag;    // CSV of goals that replace the mouse: t, x, y, z
-  std::filesystem::path script;  // what a user would do, and when; empty: none
-  std::filesystem::path record;  // the session, when the window closes; empty: not written
+  std::filesystem::path drag;    // CSV of positions (t, x, y, z) that replace the mouse
+  std::filesystem::path script;  // actions of a user at given times; empty: none
+  std::filesystem::path record;  // recording of the session, written when the window closes; empty: none
   std::string device;            // replaces the scene's device; empty: the scene's
 };
 int view(const ViewCommand& command);
@@ -166,7 +165,8 @@ int view(const ViewCommand& command);
 // second, a line is written at most every two seconds. Throws device::StopAsked once a signal came.
 Progress progress_on_terminal();
 void end_progress();
-// Both write to standard error: the notes of the build, and the file with the seconds around a fault.
+// Both write to standard error. print_notes(): notes of the build. print_fault(): the file with the seconds
+// around a fault.
 void print_notes(const BuiltScene& built);
 void print_fault(const BlackBoxFile& kept);
 

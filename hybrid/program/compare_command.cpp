@@ -87,7 +87,7 @@ Figure comparison_figure(const CompareCommand& command, const Scene& scene, cons
       {.reference = reference, .jnd_share = kJndShare, .jnd_floor_N = comparison.jnd_floor_N});
 }
 
-// All files come before the words, which a reader may cut short.
+// Writes all files. They come before the text for people, because its reader may stop reading.
 void write_files(const CompareCommand& command, const Scene& scene, const Comparison& comparison,
                  const nlohmann::ordered_json& report, const std::string& about, Outputs& outputs) {
   outputs.write_json(command.json, report);
@@ -104,7 +104,7 @@ void write_files(const CompareCommand& command, const Scene& scene, const Compar
 
 int compare_with_measured(const CompareCommand& command, const Scene& scene, Outputs& outputs) {
   MeasuredOptions options = command.measured;
-  // .traj files of the evaluation are in millimeters; a CSV without units follows the scene.
+  // .traj files are in millimeters; a CSV file without units has the scene's unit.
   if (lower_ending(options.measured.file) != ".traj") options.measured.unit_m = scene.unit_m;
   const MeasuredComparison result = compare_measured(scene, options, progress_on_terminal());
   end_progress();

@@ -10,7 +10,7 @@
 namespace hybrid {
 namespace {
 
-// A time that was not measured is 0.
+// A time in µs. 0 means that it was not measured.
 PageCell time_cell(double us) {
   return number_cell(us > 0.0 ? std::optional(us) : std::nullopt, 1);
 }
@@ -47,7 +47,7 @@ PageTable models_table(const Comparison& comparison) {
   return table;
 }
 
-// "a (0.4 JND), b (2 JND)": models whose p99 of the difference is, or is not, within 1 JND.
+// Models whose p99 of the difference is within 1 JND, or those where it is not: "a (0.4 JND), b (2 JND)".
 std::string models_within(const Comparison& comparison, bool within) {
   std::string list;
   for (std::size_t m = 0; m < comparison.models.size(); ++m) {

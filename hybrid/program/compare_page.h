@@ -11,7 +11,7 @@
 
 namespace hybrid {
 
-// One object in several ways; `about`: where and along which motion.
+// One object by several models. `about`: the scene and the motion.
 Page models_page(const Comparison& comparison, const Figure& figure, const std::string& title,
                  const std::string& about);
 // Whole scenes along one motion.

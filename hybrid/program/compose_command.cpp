@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostNamed = 24;  // most names in one line
+constexpr std::size_t kMostNamed = 24;  // names in one line at most
 
 // Quotes an argument for a shell.
 std::string in_shell(const std::string& text) {
@@ -86,7 +86,7 @@ Json composition_report(const Composed& composed) {
 int compose(const ComposeCommand& command) {
   Outputs outputs;
   outputs.ask_json(command.json);
-  const device::StopOnSignal stop;  // what was written until then goes again
+  const device::StopOnSignal stop;  // after a signal, unfinished files are removed
   const Composed composed = compose(command.options, progress_on_terminal());
   end_progress();
   outputs.write_json(command.json, composition_report(composed));

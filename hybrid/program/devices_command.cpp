@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// JSON has no infinity. Zero stands for an unknown value; both become null.
+// Zero stands for an unknown value, and JSON has no infinity. Both become null.
 Json null_if_unknown(double value) {
   return std::isfinite(value) && value > 0.0 ? Json(value) : Json(nullptr);
 }
@@ -36,7 +36,7 @@ Json to_json(const device::Box& box) {
           {"high_m", {box.high_m.x, box.high_m.y, box.high_m.z}}};
 }
 
-// Asks the person to hold the arm, if standard input is a terminal.
+// Calibrates. If standard input is a terminal, first asks the person to hold the arm.
 void calibrate(device::PhantomDevice& phantom) {
   if (isatty(STDIN_FILENO) != 0) {
     std::fprintf(stderr,

@@ -10,7 +10,7 @@ class App;
 
 namespace hybrid {
 
-// What a wrong command or option was probably meant to be, as a line of its own; empty where nothing is near.
+// A line that suggests the command or option that was probably meant; empty if no name is similar.
 std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& arguments);
 
 }  // namespace hybrid

@@ -53,7 +53,7 @@ int extremes(const ExtremesCommand& command) {
   Outputs outputs;
   outputs.ask_json(command.json);
   std::FILE* words = outputs.words();
-  const device::StopOnSignal stop;  // scratch files go
+  const device::StopOnSignal stop;  // after a signal, temporary files are removed
   nlohmann::ordered_json report = report_head("stability");
   report["scene"] = command.scene.string();
   bool ok = true;

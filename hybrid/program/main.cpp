@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The `hybrid` program: the spelling of its commands and options. Exit status: 0 done, 1 refused input, an
-// unequal replay or a violated invariant, 2 usage, 128 and the number of a signal that ended it.
+// The `hybrid` program: its commands and their options. Exit status: 0 done; 1 refused input, unequal replay
+// or violated invariant; 2 wrong usage; 128 plus the number of a signal that ended it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
@@ -33,7 +33,7 @@ constexpr const char* kAbout =
     "A scene is one small text file; scenes/README.md describes its keys.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage, 130 Ctrl-C.";
 
-// The command line, set once by main().
+// The command line as it was typed. main() sets it once.
 std::string& typed_command() {
   static std::string line;
   return line;
@@ -236,7 +236,7 @@ void add_tune(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::tune_scene(*c); });
 }
 
-// Refuses options that have no effect in the suite, and names the suites in which they have.
+// Refuses options that have no effect in the suite, and names the suites in which they have one.
 void refuse_unused(const CLI::App& bench, const std::string& suite) {
   for (const hybrid::BenchOption& option : hybrid::bench_options()) {
     const auto& suites = option.suites;
@@ -385,7 +385,8 @@ void add_view(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::view(*c); });
 }
 
-// Words that did not reach their reader are an error like any other, but for a reader that had enough.
+// The exit status after flushing standard output. If that fails, it is an error, unless the reader closed the
+// pipe.
 int flushed(int status) {
   errno = 0;
   if (std::fflush(stdout) == 0 || errno == EPIPE) return status;
@@ -397,7 +398,7 @@ int flushed(int status) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error of its writing
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large then is a write error
   hybrid::end_at_once_on_signals();
   CLI::App app(kAbout, "hybrid");
   app.require_subcommand(1);
@@ -418,7 +419,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    const bool wanted = app.exit(e) == 0;  // --help
+    const bool wanted = app.exit(e) == 0;  // the user asked for --help or --version
     if (wanted) return flushed(0);
     std::fputs(hybrid::did_you_mean(app, {argv + 1, argv + argc}).c_str(), stderr);
     return 2;

@@ -49,7 +49,7 @@ void Outputs::say_files() const {
 int Outputs::say_stopped(int signal, const std::string& after) const {
   std::string names;
   for (std::size_t i = 0; i < written_.size(); ++i) {
-    if (i > 0 && written_[i].what == written_[i - 1].what) continue;  // several volumes
+    if (i > 0 && written_[i].what == written_[i - 1].what) continue;  // several volumes are named once
     names += (names.empty() ? "" : ", ") + written_[i].what;
   }
   fmt::print(stderr, "stopped by {}{}{}; {} written\n", signal_in_words(signal),
@@ -78,7 +78,7 @@ void end_at_once_on_signals() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
     sigaction(signal, nullptr, &before);
-    // Under nohup a closed terminal ends nothing.
+    // Under nohup, SIGHUP must not end the program.
     if (signal != SIGHUP || before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files that a command was asked to write: refused before the work if they cannot be written, written
-// each by itself after it, and said. How a command ends that a signal stopped.
+// The output files of a command. Files that cannot be written are refused before the work. After it each file
+// is written independently of the others, and its name is printed. Also the end of a command that a signal
+// stopped.
 #pragma once
 
 #include <cstdio>
@@ -19,17 +20,17 @@ namespace hybrid {
 
 class Outputs {
  public:
-  // Throws std::runtime_error: the ending names another format, or no file can be written there. An empty
-  // name asks for nothing.
+  // Registers an output file; an empty name asks for nothing. Throws std::runtime_error if the name's ending
+  // is that of another format, or if no file can be written there.
   void ask(std::string_view option, const std::filesystem::path& file,
            std::initializer_list<std::string_view> endings);
   void ask_json(const std::string& file) { ask("--json", file, {".json", ".txt"}); }
   void ask_plot(const std::filesystem::path& file) { ask("--plot", file, {".svg"}); }
 
-  // Text for people goes to standard output, unless a file goes there.
+  // Stream of the text for people: standard output, or standard error if an output file is standard output.
   [[nodiscard]] std::FILE* words() const { return to_standard_output_ ? stderr : stdout; }
 
-  // What cannot be written is said, and keeps nothing else from being written.
+  // Runs `act`. An error is printed and does not keep other files from being written.
   template <class Act>
   void attempt(const Act& act) {
     try {
@@ -51,12 +52,12 @@ class Outputs {
   void write_json(const std::string& file, const nlohmann::ordered_json& report) {
     write("report", file, [&report](const std::filesystem::path& to) { save_json(to.string(), report); });
   }
-  // Names the files that were written, but for the report.
+  // Prints the names of the files that were written, except that of the report.
   void say_files() const;
   [[nodiscard]] bool failed() const { return failed_; }
 
-  // "stopped by Ctrl-C after AFTER; trace, report were written", on standard error. Returns the exit status,
-  // as a shell would: 128 and the signal's number.
+  // Prints "stopped by Ctrl-C after AFTER; trace, report were written" to standard error. Returns the exit
+  // status that a shell gives: 128 plus the signal's number.
   int say_stopped(int signal, const std::string& after) const;
 
  private:
@@ -71,14 +72,15 @@ class Outputs {
   bool to_standard_output_ = false, failed_ = false;
 };
 
-// "Ctrl-C" and the names of the other signals.
+// Name of the signal: "Ctrl-C", "SIGTERM", "SIGHUP".
 std::string_view signal_in_words(int signal);
-// The exit status of a program that a signal ended, as a shell has it.
+// The exit status that a shell gives to a program that a signal ended.
 constexpr int exit_status_of_signal(int signal) {
   return 128 + signal;
 }
 
-// From now on a signal to stop ends the program at once and is said, unless a StopOnSignal exists.
+// From now on a signal to stop prints a line and ends the program at once, except while a StopOnSignal
+// exists.
 void end_at_once_on_signals();
 
 }  // namespace hybrid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `--report DIR`: what the pages of all commands share.
+// `--report DIR`: parts that the pages of all commands share.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -11,13 +11,13 @@
 
 namespace hybrid {
 
-// The words as they are typed into a shell again: those that a shell would read otherwise are quoted.
+// The command line for a shell. Words that a shell would read differently are quoted.
 std::string command_line(int count, const char* const* words);
 
-// Refuses before the work a folder that cannot be written.
+// Refuses, before the work, a folder that cannot be written.
 void ask_report(Outputs& outputs, const ReportRequest& request);
 
-// Fills in what stands at the end of a page, and writes it. `report` begins with report_head().
+// Adds the entries at the end of a page, and writes the page. `report` must begin with report_head().
 void write_report(Outputs& outputs, const ReportRequest& request, Page page,
                   const nlohmann::ordered_json& report);
 

@@ -28,7 +28,7 @@
 namespace hybrid {
 namespace {
 
-// Moments of a session at which the forces between objects are computed.
+// Moments of a session at which the forces between objects are computed, at most.
 constexpr int kBetweenSamples = 200;
 
 bool& progress_shown() {
@@ -108,7 +108,8 @@ int run(const RunCommand& command) {
   end_progress();
   note_relaxation(scene, built, command.relaxation == "apart");
   print_notes(built);
-  const device::StopOnSignal stop;  // until here a signal ends at once, as there is nothing to keep
+  // Before this line a signal ends the program at once, because there is nothing to keep.
+  const device::StopOnSignal stop;
   if (real) {
     std::fprintf(stderr, "note: %s\n", place_real_device(scene, *built.world, *real).c_str());
     await_free_tool(scene, *built.world, *built.state, *real, progress);

@@ -38,7 +38,8 @@ std::string error_in_short(const ForceError& error) {
                      error.all.max_jnd <= 1.0 ? "of" : "from");
 }
 
-// Good: something was felt, nothing failed, and a hand would not feel the errors.
+// PageMark::good: something was touched, nothing failed, ticks were in time, and a hand would not feel the
+// errors.
 PageMark mark_of(const SessionResult& result, std::size_t faults, double p999_us) {
   if (faults > 0 || result.contact_ticks == 0) return PageMark::bad;
   const bool accurate = result.error.all.max_jnd <= 1.0, in_time = p999_us <= 1e6 * result.dt_s;

@@ -10,8 +10,8 @@
 
 namespace hybrid {
 
-// The session for a person who was not there. `report` is that of run_report(). The result has its rows and
-// the picture's moment. Without OpenGL the page says why it has no picture.
+// The session for a person who was not there. `report` comes from run_report(). The result must have its rows
+// and its snapshot `moment`. Without OpenGL the page says why it has no picture.
 Page run_page(const Scene& scene, const BuiltScene& built, const SessionResult& result,
               const nlohmann::ordered_json& report, const std::string& title);
 

@@ -61,8 +61,8 @@ std::vector<BoundaryGroup> figure_of(const StabilityReport& report) {
         panel.curves.push_back(std::move(curve));
       }
       if (panel.curves.empty()) continue;
-      // The sweep of the wall's damping reaches far beyond the passive range before it is unstable; it needs
-      // axes of its own.
+      // The sweep of the wall's damping goes far beyond the passive range before the loop is unstable. So
+      // each of its panels has its own axes.
       if (groups.empty() || groups.back().x_label != plotted.x_label ||
           plotted.sweep == StabilitySweep::wall_damping)
         groups.push_back({.x_label = plotted.x_label, .panels = {}});
@@ -101,7 +101,7 @@ int stability(const StabilityCommand& command) {
   outputs.ask_plot(command.plot);
   ask_report(outputs, command.report);
   outputs.ask_json(command.json);
-  const device::StopOnSignal stop;  // rows that are done are kept
+  const device::StopOnSignal stop;  // after a signal, finished rows are kept
   const StabilityReport report =
       measure_stability(scene, {.quick = command.quick, .progress = progress_on_terminal()});
   end_progress();

@@ -11,7 +11,7 @@
 
 namespace hybrid {
 
-// `figure`: of rigid scenes.
+// `figure`: only for rigid scenes.
 Page stability_page(const Scene& scene, const StabilityReport& report, const std::optional<Figure>& figure);
 
 }  // namespace hybrid

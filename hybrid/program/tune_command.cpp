@@ -21,7 +21,7 @@ std::string scene_text(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// The scene's file names others relative to its folder, so a copy of it has to lie there.
+// Refuses an --out in another folder. The scene's file names other files relative to its own folder.
 void refuse_other_folder(const TuneCommand& command) {
   const auto folder = [](const std::filesystem::path& file) {
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file).parent_path());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer: a window and a session, each on its own thread. The session publishes snapshots and the figures
-// of every tick, and takes goals and edits; neither waits for the other.
+// The viewer: a window and a session, each on a thread of its own. The session publishes snapshots and the
+// figures of every tick, and takes goals and edits. Neither waits for the other.
 #include <fmt/format.h>
 
 #include <atomic>
@@ -31,7 +31,7 @@ std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint6
   return folder / fmt::format("frame-{:05}.png", n);
 }
 
-// What the window asked for since the last frame, as the session takes it.
+// Converts the window's input to a request for the session.
 PlayRequest request_of(const WindowInput& input) {
   return {.dragging = input.dragged_goal_m.has_value(),
           .paused = input.paused,
@@ -53,15 +53,15 @@ ViewScript read_script(const std::filesystem::path& file, const DrawnScene& draw
   return file.empty() ? ViewScript() : ViewScript(text_of(file), file.string(), drawn);
 }
 
-// Plays frames that each stand for a fixed stretch of time, so that the pictures are reproducible on any
-// machine. Returns the exit status.
+// Plays frames that each cover a fixed time, so that the pictures are the same on any machine. Returns the
+// exit status.
 int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window, ViewScript& script) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
   Player& player = *viewed.player;
   Snapshot snapshot;
   ViewFiles files(command);
-  double ahead_s = 0.0;  // of the ticks so far
+  double ahead_s = 0.0;  // simulated time that the frames are ahead of the ticks
   for (std::uint64_t n = 0; n < *command.frames; ++n) {
     script.play(static_cast<double>(n) * kScriptFrame_s, window);
     const WindowInput input = window.take_input();
@@ -89,7 +89,7 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
   return files.save_at_end(viewed) ? 0 : 1;
 }
 
-// The session on a thread of its own, while a window shows it.
+// The session on its own thread, while a window shows it.
 class LiveSession {
  public:
   LiveSession(ViewedScene& viewed, BlackBox& box)
@@ -111,7 +111,7 @@ class LiveSession {
   void shown(const DrawnScene& drawn, Snapshot& snapshot) {
     merge_live_surface(drawn, snapshots_.take(), relaxation_->surfaces(), snapshot);
   }
-  // Waits until the servo thread leaves the state alone; false if it does not answer.
+  // Waits until the servo thread leaves the state alone. Returns false if it does not answer.
   bool hold(PlayRequest request) {
     request.hold = true;
     ask(request);
@@ -129,7 +129,7 @@ class LiveSession {
   }
 
  private:
-  static constexpr int kMostWaits = 500;  // (ms)
+  static constexpr int kMostWaits = 500;  // waits of 1 ms each
 
   device::ServoAnswer answer(const device::ServoInput& input) {
     const ScopedFlushToZero flushed;
@@ -140,7 +140,7 @@ class LiveSession {
     if (ticked || player_.edited()) publish(ticked);
     return {.force_N = player_.felt().force_N, .skip = !ticked};
   }
-  // At most 60 times a second of servo periods, however slow the session.
+  // Publishes a snapshot, at most 60 times a second of real time.
   void publish(bool ticked) {
     const auto now = std::chrono::steady_clock::now();
     if (ticked && now < next_) return;
@@ -173,7 +173,7 @@ class LiveSession {
   std::jthread thread_;
 };
 
-// What a user does to the scene that is played, and what may follow it.
+// The window of a session, with the user's files, script and reloads of the scene.
 struct LiveWindow {
   const ViewCommand& command;
   Window& window;
@@ -191,8 +191,8 @@ SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) 
   return notes;
 }
 
-// Runs the window on this thread and the session on another, until the window closes or `next` is the scene
-// to go on with. Returns the device's events.
+// Runs the window on this thread and the session on another. Ends when the window closes, or when a changed
+// scene is ready in `next`. Returns the device's events.
 device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& box,
                               std::unique_ptr<ViewedScene>& next) {
   LiveSession session(viewed, box);
@@ -216,7 +216,7 @@ device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& b
   return session.stop();
 }
 
-// Plays scene after scene: each time that its file has changed, the new one.
+// Plays a scene, and the new scene each time that the scene's file has changed.
 device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> viewed, BlackBox& box) {
   for (;;) {
     std::unique_ptr<ViewedScene> next;
@@ -237,7 +237,7 @@ device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> v
 int view(const ViewCommand& command) {
   std::unique_ptr<ViewedScene> viewed = read_viewed_scene(command);
   Scene& scene = viewed->scene;
-  // Frames are reproducible pictures, which a real device cannot give.
+  // --frames writes reproducible pictures. With a real device they would not be reproducible.
   if (command.frames && scene.real_device) {
     throw SceneError(scene.file, scene.real_device->place,
                      "--frames needs a simulated device; add --device premium-1.5");
@@ -248,7 +248,7 @@ int view(const ViewCommand& command) {
   end_progress();
   print_notes(viewed->built);
   ViewScript script = read_script(command.script, viewed->drawn);
-  // Pictures of frames show the scene alone, unless a script plays the window's user.
+  // With --frames the pictures show only the scene, unless a script acts as the window's user.
   Window window(viewed->drawn, {.visible = !command.frames || command.out.empty(),
                                 .panels = !command.frames || !command.script.empty()});
   const device::StopOnSignal stop;

@@ -14,7 +14,7 @@
 namespace hybrid {
 namespace {
 
-constexpr std::chrono::seconds kShown{6};  // how long a message stays
+constexpr std::chrono::seconds kShown{6};  // time for which a message is shown
 constexpr int kMostNames = 10'000;
 
 }  // namespace
@@ -33,7 +33,7 @@ std::string ViewFiles::message() const {
   return std::chrono::steady_clock::now() - said_ < kShown ? message_ : std::string();
 }
 
-// Beside the frames, else in the current folder.
+// A file name that does not exist yet, in the frames' folder or else in the current one.
 std::filesystem::path ViewFiles::free_name(const char* ending) const {
   for (int n = 1; n < kMostNames; ++n) {
     std::filesystem::path file =
@@ -69,7 +69,8 @@ void ViewFiles::save_what_was_asked(Window& window, const WindowInput& input, co
   if (input.save_scene) save_scene(viewed, snapshot);
 }
 
-// The window loads the scene again when its file has changed, so that recordings begin with the new text.
+// Writes edited values into the scene's file. The window then loads the changed scene again, so that
+// recordings begin with the new text.
 void ViewFiles::save_scene(const ViewedScene& viewed, const Snapshot& snapshot) try {
   std::vector<ValueInScene> values;
   for (std::size_t n = 0; n < viewed.drawn.editable.size() && n < snapshot.values.size(); ++n) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files that the user of a window asks for: pictures, recordings, and edited values in the scene's file.
-// What cannot be written is said in the window, and the session goes on.
+// The files that a window's user asks for: pictures, recordings, and edited values in the scene's file. If a
+// file cannot be written, the window shows the error, and the session goes on.
 #pragma once
 
 #include <chrono>
@@ -19,14 +19,15 @@ class ViewFiles {
   // Throws std::runtime_error if --record cannot be written.
   explicit ViewFiles(const ViewCommand& command);
 
-  // `hold`: stops the session, so that its state can be read; false if it does not answer.
+  // `hold`: stops the session, so that its state can be read. Returns false if the session does not answer.
   void save_what_was_asked(Window& window, const WindowInput& input, const ViewedScene& viewed,
                            const Snapshot& snapshot, const std::function<bool()>& hold);
-  // The recording of --record. False if it was asked for and not written; the reason is on standard error.
+  // Writes the recording of --record. Returns false if it was asked for and could not be written; the reason
+  // is on standard error.
   [[nodiscard]] bool save_at_end(const ViewedScene& viewed) const;
 
   void say(std::string words);
-  // The last thing that was done, for a few seconds; empty: nothing.
+  // The result of the last action, for a few seconds; then empty.
   [[nodiscard]] std::string message() const;
 
  private:

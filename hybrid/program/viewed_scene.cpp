@@ -12,9 +12,9 @@
 namespace hybrid {
 namespace {
 
-constexpr std::chrono::milliseconds kLookEvery{300};  // at the scene's file
+constexpr std::chrono::milliseconds kLookEvery{300};  // time between two looks at the scene's file
 
-// Places of the hand from the path's beginning to its end.
+// Positions of the hand along the whole path.
 std::vector<glm::dvec3> places_along(const device::Path& path) {
   constexpr int steps = 500;
   std::vector<glm::dvec3> places;
@@ -43,7 +43,7 @@ std::string text_of(const std::filesystem::path& file) {
 
 std::unique_ptr<ViewedScene> read_viewed_scene(const ViewCommand& command) {
   auto viewed = std::make_unique<ViewedScene>();
-  viewed->scene = load_scene(command.scene);  // first: its refusals say more
+  viewed->scene = load_scene(command.scene);  // comes first: its error messages are more precise
   viewed->text = text_of(command.scene);
   if (!command.device.empty()) use_device(viewed->scene, command.device);
   return viewed;
@@ -58,8 +58,8 @@ void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const P
   if (!scene.real_device) viewed.drawn.path_m = places_along(*scene_path(scene));
 }
 
-// The time of the last change is looked at first, because it costs least. An editor that is still writing
-// changes it again.
+// Looks first at the time of the last change, because that is cheap. If an editor is still writing, the time
+// will change again.
 bool SceneReload::file_changed() {
   const auto now = std::chrono::steady_clock::now();
   if (now - looked_ < kLookEvery) return false;
@@ -70,9 +70,9 @@ bool SceneReload::file_changed() {
   written_ = written;
   try {
     if (text_of(command_.scene) != tried_text_) return true;
-    error_.clear();  // the refused change was taken back
+    error_.clear();  // the change that was refused has been undone
   } catch (const std::runtime_error&) {
-    // The file is away for a moment while an editor replaces it.
+    // An editor that replaces the file removes it for a moment.
   }
   return false;
 }

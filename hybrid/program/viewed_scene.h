@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene with all that shows and plays it in a window, and its loading anew while another one is played.
+// A scene with all that is needed to show and play it in a window, and reloading it while another one is
+// played.
 #pragma once
 
 #include <chrono>
@@ -14,34 +15,34 @@
 namespace hybrid {
 
 struct ViewedScene {
-  std::string text;  // of the file, as it was loaded
+  std::string text;  // of the scene's file when it was loaded
   Scene scene;
   BuiltScene built;
   DrawnScene drawn;
   std::unique_ptr<Player> player;  // null until the session begins
 };
 
-// Content of a text file. Throws std::runtime_error: not readable.
+// Content of a text file. Throws std::runtime_error if it is not readable.
 [[nodiscard]] std::string text_of(const std::filesystem::path& file);
 
 // Reads the file. Throws SceneError, std::runtime_error.
 [[nodiscard]] std::unique_ptr<ViewedScene> read_viewed_scene(const ViewCommand& command);
-// Builds what was read. Throws SceneError.
+// Builds the scene that was read. Throws SceneError.
 void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const Progress& progress);
 
-// Loads the scene again when its file has changed, on a thread of its own: the old session goes on meanwhile,
-// and after an error.
+// Loads the scene again when its file has changed, on a thread of its own. The old session goes on meanwhile,
+// and also after an error.
 class SceneReload {
  public:
   SceneReload(const ViewCommand& command, std::string loaded_text)
       : command_(command), tried_text_(std::move(loaded_text)) {}
 
-  // Loads even if the file is the same.
+  // Loads the scene even if its file has not changed.
   void ask() { asked_ = true; }
-  // To be called once a frame. Non-null once a scene is ready to be played, on a simulated device.
+  // Call once a frame. Returns a scene when it is ready to be played on a simulated device, otherwise null.
   [[nodiscard]] std::unique_ptr<ViewedScene> poll();
   [[nodiscard]] bool loading() const { return next_.valid(); }
-  // Why the file as it is now is refused, with its line; empty: it is not.
+  // Error of the file as it is now, with its line; empty if it has none.
   [[nodiscard]] const std::string& error() const { return error_; }
 
  private:
@@ -49,7 +50,7 @@ class SceneReload {
   void start();
 
   const ViewCommand& command_;
-  std::string tried_text_, error_;  // the text that was loaded last, and why a later one is refused
+  std::string tried_text_, error_;  // the text that was loaded last; error of a later text
   bool asked_ = false;
   std::chrono::steady_clock::time_point looked_{};
   std::filesystem::file_time_type written_{};

@@ -19,7 +19,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kShareAfterFault = 0.25;  // share of the ring
+constexpr double kShareAfterFault = 0.25;  // share of the ring that is recorded after a fault
 constexpr std::size_t kLongestRow = 1024;  // characters; holds 30 numbers of at most 24
 
 constexpr std::array<std::string_view, 7> kFaultWords{

@@ -9,9 +9,10 @@
 namespace hybrid {
 namespace {
 
-constexpr double kExactWithin = 1.0;  // spacings; beyond this the half-space's distance is exact enough
+// Unit: spacings. At a greater distance the half-space's distance is exact enough.
+constexpr double kExactWithin = 1.0;
 
-// Distance from a voxel's ball to the rigid surfaces themselves, at most `range_m`.
+// Distance from a voxel's ball to the rigid surfaces themselves, not to their half-spaces; at most `range_m`.
 double rigid_gap(const World& world, const WorldState& state, const glm::dvec3& at, double radius_m,
                  double range_m) noexcept {
   double gap = range_m;

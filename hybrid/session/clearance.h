@@ -8,14 +8,14 @@
 
 namespace hybrid {
 
-// Least distance between surface voxels, each a ball of half its spacing, and any other surface (m).
-// Negative: the depth of the overlap. NaN: nothing is near.
+// Least distance between the surface voxels and any other surface (m). A surface voxel counts as a ball whose
+// diameter is the spacing. Negative: depth of the overlap. NaN: nothing is near.
 struct Clearance {
   double rigid_m, soft_m;
 };
 Clearance clearance(const World& world, const WorldState& state) noexcept;
 
-// Over time.
+// The clearance over the time of a session.
 struct ClearanceCourse {
   std::vector<double> t_s, rigid_m, soft_m;
   double cell_m = 0.0;  // the smallest spacing in the scene

@@ -11,8 +11,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kSettleTicks = 1200;  // most ticks of equilibrium_force()
-constexpr int kStillTicks = 40;     // ticks over which its force must stay within the tolerance
+constexpr int kSettleTicks = 1200;  // the most ticks that equilibrium_force() runs
+constexpr int kStillTicks = 40;     // ticks over which the force must stay within the tolerance
 
 }  // namespace
 
@@ -28,9 +28,9 @@ std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& sta
 
 namespace {
 
-// True if the anchors carry the felt force of each object that nothing but the tool presses. Far from rest an
-// object can stand still: with active limits all around a deep push, nothing moves from one cycle to the
-// next, although half of the load has not reached the anchors, or is not felt.
+// Do the anchors carry the felt force of each object that only the tool presses? Standing still does not
+// prove equilibrium. In a deep push with active limits all around, nothing may move from one cycle to the
+// next. Yet half of the load may not have reached the anchors, or may not be felt.
 bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
   constexpr double kShare = 0.01, kLeast_N = 1e-3;
   if (!world.soft_pairs.empty()) return true;

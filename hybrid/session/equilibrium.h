@@ -14,8 +14,9 @@ namespace hybrid {
 std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
 
 // The force at the present device position once all tissue is at rest (N). A copy of the state is relaxed
-// until the force changes by less than `tolerance_N` over dozens of whole relaxation cycles and the anchors
-// carry it; moving bodies stand still meanwhile. Empty when the force does not settle, or a signal came.
+// until two things hold: the force changes by less than `tolerance_N` over dozens of whole relaxation cycles,
+// and the anchors carry it. Moving bodies stand still meanwhile. Empty if the force does not settle, or if a
+// signal came.
 std::optional<glm::dvec3> equilibrium_force(const World& world, const WorldState& state,
                                             double tolerance_N = 1e-4);
 

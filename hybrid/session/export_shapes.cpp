@@ -60,7 +60,7 @@ class SoftSlices {
 
   const voxel::SoftObject& object_;
   voxel::VolumeFrame frame_;
-  std::array<std::uint8_t, 256> label_{};  // label in the source of each lattice label
+  std::array<std::uint8_t, 256> label_{};  // [lattice label]; the label in the source
 };
 
 std::string as_file_name(std::string name) {

@@ -14,14 +14,15 @@ namespace hybrid {
 // header. Throws std::runtime_error in words.
 void save_surfaces(const std::filesystem::path& file, const BuiltScene& built);
 
-// Writes a displacement field and the moved labels of each soft object (millimeters). Their frame is that of
-// the volume which the object came from, before the scene's position and rotation, so they lie on that
-// volume. With one soft object the field is `file`; with several, the object's name stands before the ending.
-// The labels' name has "-labels" there. Returns what was written. Throws in words: no soft object, an ending
-// that is no volume's, a file that cannot be written.
+// Writes two volumes for each soft object: the displacement field and the moved labels (millimeters). Their
+// frame is that of the volume from which the object was read, before the scene's position and rotation. So
+// they lie on that volume. With one soft object the field is written to `file`. With several, the object's
+// name stands before the ending. The name of the labels' file has "-labels" there. Returns the files that
+// were written. Throws std::runtime_error in words: no soft object, an ending that is no volume's, a file
+// that cannot be written.
 std::vector<std::filesystem::path> save_volumes(const std::filesystem::path& file, const Scene& scene,
                                                 const BuiltScene& built);
-// The names that save_volumes() would write to; throws as it does.
+// The names of the files that save_volumes() would write. Throws as save_volumes() does.
 std::vector<std::filesystem::path> saved_volume_names(const std::filesystem::path& file, const Scene& scene);
 
 }  // namespace hybrid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which material of a soft object the tool feels: that of the touched voxel nearest to it.
+// The material of a soft object that the tool feels: the material of the touched voxel nearest to the tool.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace hybrid {
 struct FeltMaterial {
   std::string name;
   std::uint64_t contact_ticks = 0;
-  double max_force_N = 0.0;  // of the object, while this material was under the tool
+  double max_force_N = 0.0;  // largest force of the object while this material was under the tool
 };
 
 class FeltMaterials {
@@ -23,8 +23,8 @@ class FeltMaterials {
 
   FeltMaterials(const Scene& scene, const World& world);
 
-  // After a tick: counts the material of soft object `o` that is under the tool. Returns its index in of(o);
-  // kNone if the object is not felt. Allocates nothing.
+  // Call after a tick. Counts the material of soft object `o` that is under the tool, and returns its index
+  // in of(o). Returns kNone if the object is not felt. Allocates nothing.
   std::uint8_t add(const World& world, const WorldState& state, std::size_t o, double force_N) noexcept;
   // All materials of the object, felt or not.
   [[nodiscard]] const std::vector<FeltMaterial>& of(std::size_t o) const { return felt_[o]; }

@@ -16,8 +16,8 @@
 namespace hybrid {
 namespace {
 
-// The run is slow from this long before a contact, and until this long after the device stopped: tissue rests
-// by then in the slow run.
+// The reference runs slowly from kBefore_s before a contact until kUntilStill_s after the device stopped. In
+// the slow run tissue rests by then.
 constexpr double kBefore_s = 0.02, kUntilStill_s = 0.5;
 constexpr std::size_t kReportEvery = 64;  // ticks
 
@@ -62,7 +62,7 @@ class Errors {
       }
       ++range->samples;
       range->max_N = std::max(range->max_N, error_N);
-      range->rms_N += error_N * error_N;  // a sum until result() ends it
+      range->rms_N += error_N * error_N;  // sum of squares until result() takes the root
     }
     errors_N_.push_back(error_N);
     jnds_.push_back(jnd);
@@ -84,7 +84,8 @@ class Errors {
  private:
   ForceError error_;
   std::vector<double> errors_N_, jnds_;
-  double longest_s_ = 0.0, beyond_s_ = 0.0;  // longest still time; longest one beyond 1 JND
+  // The longest time still, and the longest time still at which the error was beyond 1 JND.
+  double longest_s_ = 0.0, beyond_s_ = 0.0;
 };
 
 }  // namespace
@@ -124,7 +125,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
                                   : tick.device_m};
       felt = haptic_tick(world, state, at, options.dt_s / parts);
     }
-    // Nested patches end within the object, and the reference must not share the error of that.
+    // Patches end within the object, which causes an error. The reference must not share it.
     for (std::size_t o = 0; o < state.soft.size(); ++o) {
       if (wide[o] || state.soft[o]->patches_in_use() == nullptr) continue;
       state.soft[o]->widen_patches();

@@ -15,10 +15,10 @@ namespace {
 
 using Kind = ObjectPair::Kind;
 
-// Links at their limits carry a load that only the balance can confirm: it has to close to this share of the
-// largest force, or to this force.
+// Links at their limits carry a load that only the balance of forces can confirm. The balance must close to
+// kBalanced times the largest force, or to kBalanced_N.
 constexpr double kBalanced = 0.01, kBalanced_N = 1e-4;
-// Of the spacing, beyond a voxel's ball: the surface of its half-space is looked for so far.
+// The surface of a half-space is looked for up to this share of the spacing beyond the voxel's ball.
 constexpr double kLookBeyond = 0.5;
 
 // The rigid object that surface voxel s lies on, if any.
@@ -40,7 +40,7 @@ std::optional<std::uint32_t> rigid_under(const World& world, const WorldState& s
   return near.found ? std::optional(near.object) : std::nullopt;
 }
 
-// The voxels of one soft object that hand, anchors and rigid objects hold.
+// Lists the voxels of one soft object that the hand, anchors and rigid objects hold.
 std::vector<voxel::HeldVoxel> held_voxels(const World& world, const WorldState& state, std::size_t soft) {
   const voxel::SoftObject& object = *state.soft[soft];
   std::vector<voxel::HeldVoxel> held;
@@ -64,8 +64,8 @@ bool has_partner(const std::vector<voxel::HeldVoxel>& held, std::uint32_t partne
                      [partner](const voxel::HeldVoxel& h) { return h.partner == partner; });
 }
 
-// The same of an object whose contact is on nested patches. Patches know forces of springs alone, so at
-// limits the balance has to confirm them.
+// Adds the forces of anchors and rigid objects on a soft object whose contact is on patches. Patches know
+// only the forces of springs. So with links at their limits the balance has to confirm these forces.
 void add_supports_of_patches(const World& world, const WorldState& state, std::uint32_t soft,
                              std::vector<PairForce>& out) {
   const voxel::SoftObject& object = *state.soft[soft];
@@ -115,7 +115,7 @@ void add_supports(const World& world, const WorldState& state, std::uint32_t sof
   }
 }
 
-// Adds the forces of other soft objects; each pair once, by its first object.
+// Adds the forces between soft objects. Each pair is added once, by its first object.
 void add_soft_pairs(const World& world, const WorldState& state, std::vector<PairForce>& out) {
   for (std::uint32_t m = 0; m < world.soft_pairs.size(); ++m) {
     const auto [a, b] = world.soft_pairs[m];
@@ -151,7 +151,7 @@ ForceBalance balance_of(std::uint32_t soft, const glm::dvec3& hand_N, const std:
   return balance;
 }
 
-// Forces through limits of an object that has no balance are taken back.
+// If the forces on an object do not balance, those that links at their limits may carry become unknown.
 void take_back_unbalanced(std::uint32_t soft, const ForceBalance& balance, std::vector<PairForce>& pairs) {
   if (balance.sum_N && *balance.sum_N <= std::max(kBalanced * balance.largest_N, kBalanced_N)) return;
   for (PairForce& force : pairs) {

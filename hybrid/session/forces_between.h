@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Forces between the objects of a scene: how hard each pair presses on one another, and what anchors carry.
+// Forces between the objects of a scene: the force of each pair on one another, and the load of anchors.
 // They are computed between ticks, from the present state alone, never within a tick.
 #pragma once
 
@@ -22,41 +22,44 @@ struct ObjectPair {
 
 struct PairForce {
   ObjectPair pair;
-  // Of the other object on the soft one (scene frame). Empty where the state does not tell it: links at their
-  // limits tie both the other object and a third one to the same voxels, or carry loads in tissue whose
-  // forces do not balance; or the object has rigid blocks.
+  // Force of the other object on the soft one (scene's frame). It is empty in three cases, in which the state
+  // does not determine it:
+  // - links at their limits tie both the other object and a third one to the same voxels;
+  // - such links carry loads, and the forces on the tissue do not balance;
+  // - an object has rigid blocks.
   std::optional<glm::dvec3> on_soft_N;
   bool through_limits = false;  // links at their limits may carry a part of it
 };
 
-// All forces on a soft object from outside.
+// All forces on a soft object from outside the object.
 struct ForceBalance {
-  glm::dvec3 hand_N{0.0};  // of the hand on the object (scene frame)
-  double largest_N = 0.0;  // of these forces
-  // Length of their sum: 0 for tissue at rest. Tissue that still moves has no balance, because it has no
-  // inertia. Empty where a force is unknown.
+  glm::dvec3 hand_N{0.0};  // of the hand on the object (scene's frame)
+  double largest_N = 0.0;  // largest of the forces on the object
+  // Length of the sum of these forces: 0 for tissue at rest. It need not be 0 while tissue moves, because
+  // tissue has no inertia. Empty where a force is unknown.
   std::optional<double> sum_N;
 };
 
 struct ForcesBetween {
-  std::vector<PairForce> pairs;       // those that touch
+  std::vector<PairForce> pairs;       // pairs that touch
   std::vector<ForceBalance> balance;  // [soft]
 };
 // Allocates.
 [[nodiscard]] ForcesBetween forces_between(const World& world, const WorldState& state);
 
-// Over the sampled moments of a session.
+// The force of one pair over the sampled moments of a session.
 struct PairCourse {
   ObjectPair pair;
   double max_N = 0.0, max_t_s = 0.0;
-  std::optional<glm::dvec3> end_on_soft_N{};     // at the last sample; 0 if they do not touch then
-  std::uint64_t samples = 0, known_samples = 0;  // in which they touch; of these, with a known force
+  std::optional<glm::dvec3> end_on_soft_N{};  // at the last sample; 0 if the pair does not touch then
+  // Samples in which the pair touches, and those of them with a known force.
+  std::uint64_t samples = 0, known_samples = 0;
 };
 
 struct ForcesCourse {
   std::uint64_t samples = 0;
   double end_t_s = 0.0;
-  std::vector<PairCourse> pairs;          // that touched at any sample, in the order of objects
+  std::vector<PairCourse> pairs;          // pairs that touch at any sample, in the order of objects
   std::vector<ForceBalance> end_balance;  // [soft]
   void add(const ForcesBetween& now, double t_s);
 };

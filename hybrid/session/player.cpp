@@ -15,7 +15,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kHandSpeed_m_per_s = 0.5;  // a brisk hand; the mouse is faster
+constexpr double kHandSpeed_m_per_s = 0.5;  // speed of a brisk hand; a mouse could be faster
 
 TickSample sample_of(const TickResult& felt, double t_s, double late_s, double dt_s) noexcept {
   return {.t_s = t_s,
@@ -95,7 +95,7 @@ bool Player::tick_is_due(const PlayRequest& request) noexcept {
   return true;
 }
 
-// After a drag the tool stays at its last goal until a restart.
+// After a drag the tool stays at the last goal of the drag until a restart.
 void Player::steer(const PlayRequest& request) noexcept {
   if (request.restarts != restarts_) {
     restarts_ = request.restarts;

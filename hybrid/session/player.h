@@ -16,15 +16,15 @@
 
 namespace hybrid {
 
-// What a window asks of the session. It is handed over as a whole, so everything that happens once is a
-// counter.
+// The window's requests to the session. They are handed over as a whole and may be skipped. So each event
+// that happens once is a counter.
 struct PlayRequest {
   bool dragging = false, paused = false;
-  bool hold = false;           // as paused, and no edit is taken: the state may be read by the other thread
-  double speed = 1.0;          // simulated time over real time, 0 to 1; a real device has 1
-  std::uint32_t restarts = 0;  // of the hand's path
-  std::uint32_t single_ticks = 0;  // while paused
-  glm::dvec3 goal_m{0.0};          // of the drag
+  bool hold = false;               // as paused, and no edit is taken: the window's thread may read the state
+  double speed = 1.0;              // simulated time over real time, 0 to 1; always 1 with a real device
+  std::uint32_t restarts = 0;      // counts restarts of the hand's path
+  std::uint32_t single_ticks = 0;  // counts single steps while paused
+  glm::dvec3 goal_m{0.0};          // position to which the mouse drags the tool; scene's frame
 };
 
 // Target of the simulated hand: the scene's path, or the goal of the mouse. The device reads it within a
@@ -47,46 +47,47 @@ class SteeredPath final : public device::Path {
 
 class Player {
  public:
-  // Longest session that is kept as a recording (s): 86 MB at 1 kHz. What follows is not kept.
+  // A recording keeps at most this much of a session (s): 86 MB at 1 kHz. Later ticks are not kept.
   static constexpr double kMostRecorded_s = 1800.0;
-  // Edits that may wait for the next tick, and edits of a whole session.
+  // Edits that may wait for the next tick, and edits that a whole session may apply.
   static constexpr std::size_t kEditsWaiting = 256, kMostEdits = 100'000;
-  static constexpr std::size_t kSamples = 8192;  // eight seconds without a frame, at 1 kHz
+  // Ticks whose figures may wait for a frame: eight seconds at 1 kHz.
+  static constexpr std::size_t kSamples = 8192;
 
-  // Starts the proxy or throws SceneError. `real_device`: null for the scene's simulated one. Keeps
-  // references.
+  // Starts the proxy, or throws SceneError. `real_device`: null for the scene's simulated device. Keeps
+  // references to all arguments.
   Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn, device::HapticDevice* real_device);
 
-  // Before the first tick. go_live(): from now on a thread relaxes the tissue; the caller keeps that thread.
-  // relax_at_once(): for frames that are reproducible.
+  // Call one of these two before the first tick. After go_live() a thread relaxes the tissue; the caller
+  // keeps that thread. relax_at_once() relaxes it within the tick, so that frames are reproducible.
   [[nodiscard]] std::unique_ptr<RelaxationThread> go_live(double surfaces_hz);
   void relax_at_once();
 
   // ---- the servo thread; neither allocates, locks or throws ----
-  // Takes edits, and does one tick if one is due. `felt` is the last tick's result. True if there was a tick.
+  // Takes edits, and does one tick if one is due. Returns true if there was a tick.
   bool advance(const PlayRequest& request, const device::ServoInput& input) noexcept;
   [[nodiscard]] const TickResult& felt() const noexcept { return felt_; }
-  // The snapshot of now, from within the servo loop.
+  // Fills the snapshot of this moment, from within the servo loop.
   void snapshot(Snapshot& out) const;
-  // Edits were taken since the last snapshot.
+  // Were edits taken since the last snapshot?
   [[nodiscard]] bool edited() const noexcept { return edited_; }
   void shown() noexcept { edited_ = false; }
 
-  // ---- the same without a servo loop: one period on this thread ----
+  // ---- without a servo loop: one period on the calling thread ----
   void step(const PlayRequest& request);
 
   // ---- the window's thread ----
-  // Queues an edit; false, and counted, if too many wait.
+  // Queues an edit. Returns false, and counts the refusal, if too many edits wait.
   bool edit(const Edit& edit) noexcept { return edits_.push(edit); }
   [[nodiscard]] std::uint64_t refused_edits() const noexcept { return edits_.refused(); }
   [[nodiscard]] TickSamples& samples() noexcept { return samples_; }
-  // Ticks whose figures found no room, because no frame came for too long.
+  // Ticks whose figures were dropped because no frame came for too long.
   [[nodiscard]] std::uint64_t unseen_ticks() const noexcept { return samples_.refused(); }
   [[nodiscard]] bool is_real() const noexcept { return simulated_ == nullptr; }
-  // The servo thread has seen PlayRequest::hold and leaves the state alone.
+  // Has the servo thread seen PlayRequest::hold? If so it leaves the state alone.
   [[nodiscard]] bool held() const noexcept { return held_.load(std::memory_order_acquire); }
-  // The session so far. Only while held, or after the session. Throws std::runtime_error if the session is
-  // longer than what is kept.
+  // The session so far. Call only while held, or after the session. Throws std::runtime_error if the session
+  // is longer than kMostRecorded_s.
   [[nodiscard]] Recording recording(const std::string& scene_text) const;
 
   [[nodiscard]] double t_s() const noexcept { return static_cast<double>(ticks_) * dt_s_; }
@@ -113,7 +114,7 @@ class Player {
   bool live_ = false, async_ = false, edited_ = false, whole_ = true;
   std::uint64_t ticks_ = 0, hash_ = kHashBegin;
   std::uint32_t restarts_ = 0, single_ticks_ = 0;
-  double due_ = 0.0;  // ticks that are due, in slow motion
+  double due_ = 0.0;  // ticks that are due, in slow motion: a fraction below 1
   TickResult felt_;
   std::vector<RecordedTick> recorded_;
   std::vector<Edit> applied_;

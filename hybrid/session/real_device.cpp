@@ -16,8 +16,8 @@ namespace {
 
 constexpr int kPathSamples = 500;
 
-// Box around the path and all objects, enlarged by the tool's radius: everything that the hand may want to
-// reach.
+// Box around all places that the hand may want to reach: the path, and all objects enlarged by the tool's
+// radius.
 device::Box reach_of(const Scene& scene, const World& world) {
   const auto path = scene_path(scene);
   device::Box box{path->position(0.0), path->position(0.0)};

@@ -157,7 +157,7 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
                     recording.scene_file.string()));
   }
   Scene scene = load_scene(recording.scene_file);
-  scene.opened_limits = recording.device;  // the recording device may not be connected now
+  scene.opened_limits = recording.device;  // the device of the recording may not be connected now
   if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // the driver's rate
   const BuiltScene built = build_scene(scene, progress);
   ReplayResult result;

@@ -13,8 +13,9 @@
 namespace hybrid {
 
 struct Recording {
-  std::filesystem::path scene_file;  // where the scene was; replay reads it again from there
-  std::string scene_text;            // at the time of recording, so that a changed scene is noticed
+  std::filesystem::path scene_file;  // the scene's file at the time of recording; replay reads it again
+  // Text of that file at the time of recording, so that a change is noticed.
+  std::string scene_text;
   double dt_s = 1e-3;
   device::DeviceLimits device{};  // limits of the device that was used
   bool async_relaxation = false;  // SessionOptions::async_relaxation
@@ -24,14 +25,15 @@ struct Recording {
   std::vector<Edit> edits{};  // in order of their ticks
 };
 
-// Both throw std::runtime_error in words: not writable; not a recording, truncated, of another version.
+// Both throw std::runtime_error in words. Causes: not writable; not a recording, truncated, or of another
+// version.
 void save_recording(const std::filesystem::path& file, const Recording& recording);
 Recording load_recording(const std::filesystem::path& file);
 
 struct ReplayResult {
-  std::uint64_t ticks = 0, state_hash = 0;  // of the recording; of the replay
+  std::uint64_t ticks = 0, state_hash = 0;  // ticks of the recording; final hash of the replay
   std::uint64_t replayed_ticks = 0;  // fewer than `ticks` where a signal ended the replay (StopOnSignal)
-  bool equal = false;                // of the ticks that were replayed
+  bool equal = false;                // are all replayed ticks equal to those recorded?
   std::uint64_t first_difference =
       0;  // first tick whose hash differs; the number of ticks when only the final hash differs
 };

@@ -54,7 +54,7 @@ void take_ordinary_priority() noexcept {
 
 void RelaxationThread::run() {
   take_ordinary_priority();
-  set_flush_to_zero();  // like the tick: a replay must be equal bit by bit
+  set_flush_to_zero();  // as the tick does: a replay must be equal bit by bit
   using Clock = std::chrono::steady_clock;
   Clock::time_point next = Clock::now();
   while (!stop_.load(std::memory_order_relaxed)) {

@@ -12,13 +12,15 @@
 
 namespace hybrid {
 
-// The calling thread goes on at ordinary priority. A thread that the servo thread made inherits its priority.
+// Gives the calling thread ordinary priority. A thread that the servo thread makes inherits its high
+// priority.
 void take_ordinary_priority() noexcept;
 
-// Runs until it is destroyed. It polls every 100 us: waking it would be a system call from the tick.
+// The thread runs until this object is destroyed. It polls every 100 us, because waking it would cost the
+// tick a system call.
 class RelaxationThread {
  public:
-  // `surfaces_hz`: how often, between two results, it also publishes where surfaces are; 0: never.
+  // `surfaces_hz`: how often it publishes the positions of surfaces between two results; 0: never.
   RelaxationThread(const World& world, AsyncRelaxation& async, double surfaces_hz);
   ~RelaxationThread();
   RelaxationThread(const RelaxationThread&) = delete;
@@ -26,9 +28,9 @@ class RelaxationThread {
   RelaxationThread(RelaxationThread&&) = delete;
   RelaxationThread& operator=(RelaxationThread&&) = delete;
 
-  // Its own processor time so far (s).
+  // Processor time of this thread so far (s).
   [[nodiscard]] double busy_s() const { return busy_s_.load(std::memory_order_relaxed); }
-  // The latest surfaces, for one other thread, which draws.
+  // The latest surfaces. Only one other thread may take them: the one that draws.
   [[nodiscard]] const MovedSurfaces& surfaces() noexcept { return surfaces_.take(); }
 
  private:

@@ -27,7 +27,7 @@ std::string processor() {
   return "unknown processor";
 }
 
-// The compiler, and the settings of a build that can slow it down.
+// The compiler, and the build settings that can slow the program down.
 std::string build_text() {
 #ifdef __OPTIMIZE__
   constexpr const char* kOptimised = "optimised";
@@ -49,11 +49,11 @@ std::string build_text() {
 
 struct ObjectRow {
   std::string name, kind, motion{};  // motion: empty if the object stays
-  glm::dvec3 position_m{0.0};        // of a moving object, at the end
+  glm::dvec3 position_m{0.0};        // position of a moving object at the end of the session
   std::size_t triangles = 0, voxels = 0, surface_voxels = 0, memory_bytes = 0;
   std::uint64_t contact_ticks = 0;
   double max_force_N = 0.0;
-  std::vector<FeltMaterial> materials{};  // those that were felt
+  std::vector<FeltMaterial> materials{};  // the materials that were felt
 };
 
 std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult& result) {
@@ -86,7 +86,7 @@ std::vector<ObjectRow> object_rows(const BuiltScene& built, const SessionResult&
   return rows;
 }
 
-// RMS of the force that the passivity controller removed, over the ticks with a force.
+// RMS of the force that the passivity controller removed, over the ticks in which a force was felt.
 double rms_taken_N(const device::PassivityState& passive) {
   return passive.felt > 0 ? std::sqrt(passive.taken_sum_N2 / static_cast<double>(passive.felt)) : 0.0;
 }

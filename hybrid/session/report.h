@@ -10,15 +10,15 @@
 
 namespace hybrid {
 
-// Starts every report: command, version, machine.
+// The first entries of every report: command, version, machine.
 nlohmann::ordered_json report_head(const std::string& command);
 nlohmann::ordered_json to_json(const Percentiles& p);
 nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, SessionResult& result);
 
-// The same for a person to read.
+// The same report as text for a person to read.
 std::string run_summary(const BuiltScene& built, SessionResult& result);
 
-// The faults that are set, in words, each with its remedy where there is one; empty when none is set.
+// Texts of the faults that are set, each with its remedy where there is one. Empty when none is set.
 std::vector<std::string> fault_texts(std::uint32_t faults);
 
 // Writes to a file, or to standard output for "-". Throws std::runtime_error: not writable.

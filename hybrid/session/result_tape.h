@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// All results of asynchronous relaxation in a session. Replayed from the tape, the session's ticks are the
-// same to the last bit, whatever the other cores do meanwhile.
+// All results of asynchronous relaxation in a session. With the results of this tape, the ticks of a replayed
+// session are the same to the last bit, whatever the other cores do meanwhile.
 #pragma once
 
 #include <cstddef>
@@ -14,17 +14,18 @@ class ResultTape {
  public:
   explicit ResultTape(std::size_t objects) : found_(objects), next_(objects, 0) {}
 
-  // After each tick of a session of Arrival::recorded.
+  // Call after each tick of a session that runs with Arrival::recorded.
   void keep(const AsyncRelaxation& async);
-  // By another thread, in a session of Arrival::played: states submitted since the last call get their
-  // results.
+  // Called by another thread in a session that runs with Arrival::played. Gives the states that were
+  // submitted since the last call their results.
   void hand_out(AsyncRelaxation& async) noexcept;
   // Are the results that the next tick applies ready?
   [[nodiscard]] static bool ready(const AsyncRelaxation& async) noexcept;
 
  private:
   std::vector<std::vector<voxel::ShadowObject::Result>> found_;  // [soft]
-  std::vector<std::size_t> next_;                                // [soft] to be handed out
+  // [soft]; index of the next result to be handed out
+  std::vector<std::size_t> next_;
 };
 
 }  // namespace hybrid

@@ -13,13 +13,15 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kPlaces = 4;        // of contact that are measured
-constexpr double kBefore_s = 0.05;        // from free space to the object
-constexpr double kSample_s = 0.25;        // of a place
-constexpr double kLook_s = 1e-3;          // between two looks at the path
-constexpr double kMostLooks = 200'000.0;  // a longer path is looked at less often
+constexpr std::size_t kPlaces = 4;  // places of contact that are measured
+// Time in which the hand moves in free space before it reaches the object.
+constexpr double kBefore_s = 0.05;
+constexpr double kSample_s = 0.25;  // measured time at each place
+constexpr double kLook_s = 1e-3;    // time between two samples of the path
+// Samples of the path at most. A longer path is sampled more coarsely.
+constexpr double kMostLooks = 200'000.0;
 
-// The rest of a path.
+// The part of a path from `from_s` on.
 class PathFrom final : public device::Path {
  public:
   PathFrom(std::shared_ptr<const device::Path> path, double from_s)
@@ -37,7 +39,7 @@ class PathFrom final : public device::Path {
   double from_s_;
 };
 
-// The times at which the path comes near an object, by the occupancy map at rest.
+// The times at which the path comes near an object. Objects are taken at rest, from the occupancy map.
 std::vector<double> arrivals_s(const World& world, const WorldState& state, const device::Path& path) {
   const double margin = std::max(world.contact_radius_m(), soft_reach(world, state));
   const double step = std::max(kLook_s, path.duration_s() / kMostLooks);
@@ -80,7 +82,7 @@ SceneCost measure_cost(const Scene& scene, const BuiltScene& built) {
     try {
       felt = run_session(scene, copy, options);
     } catch (const SceneError&) {
-      continue;  // on its way out of a rigid object: no session can begin there
+      continue;  // the path starts here inside a rigid object, where no session can begin
     }
     bool any = false;
     for (const TraceRow& row : felt.rows) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a session of a scene would cost, measured on a short sample of its own path.
+// The cost of a session of a scene, measured on short samples of the scene's path.
 #pragma once
 
 #include <cstdint>
@@ -11,19 +11,20 @@ namespace hybrid {
 
 struct SceneCost {
   double load_s = 0.0;
-  std::uint64_t held_bytes = 0;        // of the program once the scene is loaded
-  std::uint64_t touched_bytes = 0;     // of soft objects that have been touched everywhere: estimated
-  int places = 0;                      // of contact along the path at which ticks were measured
-  std::uint64_t ticks = 0;             // in contact, that were measured
-  std::optional<Percentiles> tick_us;  // of these; empty: the path touches nothing
+  std::uint64_t held_bytes = 0;  // memory of the program once the scene is loaded
+  // Estimated memory of the soft objects once they have been touched everywhere.
+  std::uint64_t touched_bytes = 0;
+  int places = 0;                      // places of contact along the path at which ticks were measured
+  std::uint64_t ticks = 0;             // measured ticks in contact
+  std::optional<Percentiles> tick_us;  // of the measured ticks; empty if the path touches nothing
   double period_us = 0.0;
 };
 
-// Runs the simulated hand a quarter of a second long at up to four places where the path comes near an
-// object, spread over the path, each on a copy of the state. `built` stays as it is.
+// Measures at up to four places at which the path comes near an object, spread over the path. At each the
+// simulated hand runs for a quarter of a second on a copy of the state. `built` is not changed.
 SceneCost measure_cost(const Scene& scene, const BuiltScene& built);
 
-// "tick p50 120, p99 480 us over 812 ticks at 4 places of contact (48 % of 1 ms); …"
+// For example "… tick p50 120, p99 480 us of 1000, over 812 ticks at 4 places of contact".
 std::string in_words(const SceneCost& cost);
 
 }  // namespace hybrid

@@ -11,10 +11,10 @@
 namespace hybrid {
 namespace {
 
-constexpr int kSavedDigits = 6;       // of a number: far finer than a hand can tell
-constexpr double kSameNumber = 1e-5;  // relative: the text says what was meant
+constexpr int kSavedDigits = 6;       // digits of a saved number: far finer than a hand can tell
+constexpr double kSameNumber = 1e-5;  // relative difference up to which two numbers are the same
 
-// The end of the value that begins at `at`: of a number, or of a list on one line.
+// The end of the value that begins at `at`. The value is a number, or a list on one line.
 std::size_t end_of_value(const std::string& text, std::size_t at) {
   if (at < text.size() && text[at] == '[') return std::min(text.find(']', at), text.size() - 1) + 1;
   return std::min(text.find_first_not_of("0123456789+-._eExXabcdfinoABCDF", at), text.size());
@@ -24,15 +24,15 @@ std::string saved_number(double value) {
   return with_digits(value, kSavedDigits);
 }
 
-// Editing of one text. Each change parses it anew, because places move.
+// Editor of one text. It parses the text anew for each change, because a change moves what follows.
 class SceneTextEditor {
  public:
   SceneTextEditor(std::string text, const std::filesystem::path& file)
       : text_(std::move(text)), file_(file) {}
 
   [[nodiscard]] const std::string& text() const { return text_; }
-  // Sets `key` of a table; empty on success, else the reason. `table`: finds it in the root, null: there is
-  // none, and `header` begins it at the end of the text.
+  // Sets `key` of a table. Returns an empty text on success, otherwise the reason. `table` finds the table in
+  // the root, or returns null if there is none. Then `header` starts the table at the end of the text.
   template <class Find>
   std::string set(const Find& table, std::string_view header, std::string_view key,
                   const std::string& value) {
@@ -57,7 +57,7 @@ class SceneTextEditor {
   }
 
  private:
-  // The new text is kept only if it reads as meant.
+  // Keeps the new text only if `key` reads as `value` in it.
   template <class Find>
   std::string accept(std::string changed, const Find& table, std::string_view key, const std::string& value) {
     try {
@@ -100,7 +100,7 @@ const TreeNode* rigid_named(const TreeNode& root, std::string_view name) {
   return nullptr;
 }
 
-// Both coefficients stand in one key.
+// The two coefficients of friction share one key.
 std::optional<std::string> friction_text(std::span<const ValueInScene> values, const std::string& object) {
   std::optional<double> at_rest, sliding;
   for (const ValueInScene& value : values) {

@@ -14,19 +14,19 @@ namespace hybrid {
 struct ValueInScene {
   std::string object;  // name of a rigid object; empty: of the tool
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
-  double value = 0.0, in_scene = 0.0;  // SI: now, and as the scene has it
+  double value = 0.0, in_scene = 0.0;  // SI units; value now, and value in the scene
 };
 
 struct EditedText {
   std::string text;
   std::vector<std::string> changed;  // "tool: stiffness", …
-  std::vector<std::string> left;     // the same, with the reason why they are not in the text
+  std::vector<std::string> left;     // as in `changed`, with the reason why they were not written
 };
 
-// The text with every value that differs from the scene's. A key that the scene lacks is added below the
-// header of its table. Left as they are: values of objects that are not [[rigid]] tables with a name, and
+// Returns the text with every value that differs from the scene's. A key that the scene lacks is added below
+// the header of its table. Not written are values of objects that are no [[rigid]] table with a name. Nor are
 // stiffness factors of tissue, because objects may share a material. `unit_m`: length unit of the scene's
-// numbers. `file` is for messages. Throws SceneError if `text` is no TOML.
+// numbers. `file` is used in messages. Throws SceneError if `text` is no TOML.
 [[nodiscard]] EditedText write_values(const std::string& text, const std::filesystem::path& file,
                                       double unit_m, std::span<const ValueInScene> values);
 

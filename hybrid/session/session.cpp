@@ -28,7 +28,7 @@ namespace {
 constexpr double kAfterPath_s = 0.5;
 constexpr double kWithHand_s = 60.0;         // a real device has no path that ends
 constexpr std::uint64_t kMomentEvery = 20;   // ticks between two candidates for the kept snapshot
-constexpr std::uint64_t kClearances = 1000;  // samples of the clearance in a session
+constexpr std::uint64_t kClearances = 1000;  // samples of the clearance in a session, about
 
 std::uint64_t hash_in(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
   return (hash ^ bits) * 0x100000001B3ULL;
@@ -43,7 +43,8 @@ std::uint64_t hash_in(std::uint64_t hash, const glm::dquat& q) noexcept {
   return hash;
 }
 
-// Score of a moment for the kept snapshot: rigid and soft contact together first, then force.
+// Score of a moment for the kept snapshot. Contact with both rigid and soft objects counts most, then the
+// force.
 double moment_score(const World& world, const WorldState& state) {
   double score = 0.0;
   bool rigid = false, soft = false;
@@ -55,7 +56,7 @@ double moment_score(const World& world, const WorldState& state) {
   return score + (rigid && soft ? 10.0 : 0.0);
 }
 
-// A path that begins `later_s` later.
+// A path that is delayed by `later_s`.
 class LaterPath final : public device::Path {
  public:
   LaterPath(std::shared_ptr<const device::Path> path, double later_s)
@@ -78,7 +79,7 @@ std::shared_ptr<const device::Path> later(std::shared_ptr<const device::Path> pa
 
 class Run {
  public:
-  // `course`: filled tick by tick, or null.
+  // `course`: filled tick by tick. May be null.
   Run(const Scene& scene, const World& world, WorldState& state, const SessionOptions& options,
       ForceCourse* course)
       : scene_(scene),
@@ -214,7 +215,8 @@ class Run {
                     100.0 * static_cast<double>(tick) / static_cast<double>(ticks_)));
   }
 
-  // A signal ends the servo loop, which keeps what was felt; no exception may go through it.
+  // The progress callback may throw StopAsked after a signal. The exception must not leave the servo loop,
+  // which ends by itself and keeps the ticks so far.
   void say(const std::string& text) try { options_.progress(text); } catch (const device::StopAsked&) {
   }
 
@@ -358,7 +360,7 @@ void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept {
 
 namespace {
 
-// A signal ends the comparison by itself; the session before it is kept.
+// Progress without StopAsked: a signal ends the comparison by itself, and the session before it must be kept.
 Progress keep_going(const Progress& progress) {
   if (!progress) return {};
   return [&progress](const std::string& text) {

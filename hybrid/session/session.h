@@ -26,59 +26,62 @@
 
 namespace hybrid {
 
-// Percentiles of `values`; all zero when there are none. Reorders them.
+// Percentiles of `values`; all are zero if `values` is empty. Reorders `values`.
 Percentiles percentiles(std::vector<double>& values);
 
-// One tick of a recording: its input, and the running hash of all forces up to and including it.
+// One tick of a recording: the input, and the running hash of all forces up to and including this tick.
 struct RecordedTick {
   glm::dvec3 device_m{0.0};
   std::uint64_t hash = 0;
   device::DeviceFault fault = device::DeviceFault::none;
-  std::uint64_t arrived = 0;    // bit per soft object whose asynchronous result arrived in this tick
+  std::uint64_t arrived = 0;    // one bit for each soft object whose asynchronous result arrived in this tick
   std::uint8_t work_share = 0;  // WorkShare::steps()
 };
-// Call before a replayed tick: restores the inputs that depended on the machine (arrival of results, work
-// budget).
+// Call before a replayed tick. Restores the inputs that depended on the machine: the results that arrived,
+// and the work budget.
 void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept;
 
 struct SessionOptions {
-  std::optional<double> seconds;  // default: the path's length and half a second; a real device: a minute
-  bool realtime = false;          // paced by a real timer; else fixed-step, as fast as it goes
-  // A real device: open, placed in the scene, the tool outside all rigid objects; always in real time. Null:
-  // the scene's simulated device.
+  std::optional<double> seconds;  // default: length of the path plus half a second; a real device: a minute
+  bool realtime = false;          // true: paced by a real timer. False: fixed-step, as fast as possible
+  // A real device, which always runs in real time. It must be open and placed in the scene, with the tool
+  // outside all rigid objects. Null: the scene's simulated device.
   device::HapticDevice* real_device = nullptr;
-  bool keep_rows = true;        // trace rows and per-object forces
-  bool keep_recording = true;   // every input, 48 bytes a tick: without it and the rows memory stays flat
-  bool keep_clearance = false;  // distances between objects, at a thousand moments
-  // Most moments, evenly spread, at which the forces between objects are computed, beside the end. In real
-  // time the end alone.
+  bool keep_rows = true;  // trace rows and per-object forces
+  // Keep every input (48 bytes a tick). With neither inputs nor rows, memory does not grow.
+  bool keep_recording = true;
+  bool keep_clearance = false;  // keep distances between objects, at about a thousand moments
+  // The forces between objects are computed at so many moments at most, evenly spread, and at the end. In
+  // real time they are computed only at the end.
   int between_samples = 0;
   bool keep_picture = false;  // keep the snapshot with the most contact
-  // Most ticks whose force is compared with that of a slow run (force_error.h), evenly spread. The slow run
-  // takes up to kSlower times as long as the session. None in real time.
+  // The forces of so many ticks at most, evenly spread, are compared with those of a slow run
+  // (force_error.h). The slow run takes up to kSlower times as long as the session. In real time nothing is
+  // compared.
   int reference_samples = 0;
-  // Clocks, counters and path begin as after this many ticks, when a soft start is over. The forces do not
-  // depend on it.
+  // Clocks, counters and path begin as if this many ticks had passed, so that a soft start is over. The
+  // forces do not depend on this number.
   std::uint64_t start_ticks = 0;
   Progress progress;
-  // Tissue away from the contact is relaxed asynchronously: in real time on a thread of its own.
+  // Relax tissue away from the contact asynchronously. In real time a thread of its own does so.
   bool async_relaxation = false;
-  bool relaxation_thread = true;               // false: submitted states are never relaxed; for benchmarks
-  double surfaces_hz = 0.0;                    // how often that thread publishes surfaces for drawing
+  bool relaxation_thread = true;  // false: submitted states are never relaxed; for benchmarks
+  // How often the relaxation thread publishes surfaces for drawing.
+  double surfaces_hz = 0.0;
   BlackBox* black_box = nullptr;               // every tick is added to it
-  std::shared_ptr<const device::Path> path{};  // of the hand; null: the scene's path
-  std::vector<Edit> edits{};  // in order of their ticks; those without effect are not kept in the result
+  std::shared_ptr<const device::Path> path{};  // path of the hand; null: the scene's path
+  std::vector<Edit> edits{};  // in order of their ticks; edits without effect are not kept in the result
 };
 
 struct SessionResult {
   std::uint64_t ticks = 0, contact_ticks = 0, deadline_misses = 0;
-  std::uint64_t planned_ticks = 0;  // more than `ticks` where a signal or the device ended the session
+  std::uint64_t planned_ticks = 0;  // greater than `ticks` if a signal or the device ended the session
   double dt_s = 0.0;
   std::uint64_t state_hash = 0;
   std::vector<TraceRow> rows;
   std::vector<std::vector<double>> object_force_N;        // [object][row]
-  ClearanceCourse clearance;                              // of keep_clearance, where anything is soft
-  ForcesCourse between;                                   // of between_samples
+  ClearanceCourse clearance;                              // filled with keep_clearance, if anything is soft
+  ForcesCourse between;                                   // filled with between_samples
   std::vector<std::uint64_t> object_contact_ticks;        // [object]
   std::vector<double> object_max_force_N;                 // [object]
   std::vector<std::vector<FeltMaterial>> felt_materials;  // [soft object][material]
@@ -86,23 +89,24 @@ struct SessionResult {
   std::array<LatencyHistogram, kStages> stage_us;
   double max_force_N = 0.0, rms_force_N = 0.0;
   ForceError error;
-  std::optional<Snapshot> moment;       // of keep_picture
-  std::vector<RecordedTick> recording;  // of keep_recording
-  std::vector<Edit> edits{};            // that were applied
-  // Position of device and proxy as the session began. A late first tick may find the device elsewhere.
+  std::optional<Snapshot> moment;       // filled with keep_picture
+  std::vector<RecordedTick> recording;  // filled with keep_recording
+  std::vector<Edit> edits{};            // the edits that were applied
+  // Position of device and proxy when the session began. The device may be elsewhere at the first tick.
   glm::dvec3 start_m{0.0};
   std::string device_name;
   device::ServoEnd end = device::ServoEnd::finished;
   std::vector<std::string> device_messages;  // events of the device, each with its remedy
   std::vector<std::string> path_notes;       // findings of the path's reader: gaps, repeated times
   std::string realtime_note;                 // the priority that was granted, in words
-  Percentiles late_us;                       // how late the machine woke the loop; not part of the tick
-  // CPU time of the ticks, and of asynchronous relaxation: of its thread in real time, else of the work that
-  // a thread would have done.
+  // How late the machine woke the loop. This is no part of the tick's time.
+  Percentiles late_us;
+  // CPU time of the ticks, and of asynchronous relaxation. In real time the latter is that of the relaxation
+  // thread, otherwise that of the work that such a thread would have done.
   double servo_s = 0.0, relaxation_s = 0.0;
   std::uint64_t async_results = 0;  // asynchronous results that ticks applied
-  // Work budget of the contact in real time: the least share of any tick, and the number of ticks with less
-  // than all.
+  // Work budget of the contact in real time: the least share in any tick, and the number of ticks with less
+  // than the whole budget.
   double least_work_share = 1.0;
   std::uint64_t ticks_with_less_work = 0;
 };
@@ -110,28 +114,28 @@ struct SessionResult {
 // Adds notes on keys of the scene that have no effect with this kind of relaxation.
 void note_relaxation(const Scene& scene, BuiltScene& built, bool async_relaxation);
 
-// Runs the scene's path to its end on its device, or until a signal (StopOnSignal): then the result is of the
-// ticks so far, and `end` says so. Throws SceneError: the tool starts inside something rigid.
+// Runs the scene's path to its end on its device, or until a signal (StopOnSignal). After a signal the result
+// covers the ticks so far, and `end` says so. Throws SceneError if the tool starts inside something rigid.
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options);
 
-// The pieces, for callers that drive the loop themselves.
+// The parts of run_session(), for callers that drive the loop themselves.
 std::shared_ptr<const device::Path> scene_path(const Scene& scene);
 std::unique_ptr<device::HapticDevice> scene_device(const Scene& scene,
                                                    std::shared_ptr<const device::Path> path);
 // Starts the proxy or throws SceneError.
 void begin_session(const Scene& scene, const World& world, WorldState& state, const glm::dvec3& device_m);
 
-// The row of tick number `tick`, which has just ended.
+// The row of tick number `tick`. Call right after that tick.
 BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
                           const WorldState& state) noexcept;
 
-// Hashes. The running one covers the forces; the final one also every displacement, the pose and motion of
-// every rigid body, and the state of the force limits.
+// Hashes. The running hash covers the forces. The final hash also covers every displacement, the pose and
+// motion of every rigid body, and the state of the force limits.
 inline constexpr std::uint64_t kHashBegin = 0xCBF29CE484222325ULL;
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
 
-// A snapshot of now.
+// The snapshot of this moment.
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
 
 }  // namespace hybrid

@@ -15,14 +15,15 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint64_t kStateCheckEvery = 64;  // ticks between two checks of every displacement
-constexpr double kRounding = 1e-12;             // share of the sum of absolute work
+constexpr double kRounding = 1e-12;             // share of moved_J()
 
-// Safe for vectors too long to be squared.
+// Does not overflow for long vectors, whose squares would.
 double length(const glm::dvec3& v) {
   return std::hypot(v.x, v.y, v.z);
 }
 
-// The clamped coupling: ½K d² is stored up to the clamp, and the clamp's work beyond it.
+// Energy and force of the clamped coupling. The energy is ½K d² up to the clamp. Beyond it the work of the
+// constant force is added.
 struct Spring {
   glm::dvec3 clamped_N{0.0};
   double stored_J = 0.0;
@@ -63,7 +64,7 @@ bool finite(const WorldState& state) {
 TickInvariants::TickInvariants(const World& world, const WorldState& state)
     : world_(world), hash_(kHashBegin), force_N_(state.limit.last_N), device_m_(state.device_m) {
   const Spring spring = spring_of(world, state.proxy_m, state.device_m);
-  allowed_J_ = stored_J_ = spring.stored_J;  // energy that is stored already may be given
+  allowed_J_ = stored_J_ = spring.stored_J;  // the hand may get the energy that is already stored
   for (const auto& object : state.soft) {
     if (object->moved_ever()) allowed_J_ += object->energy_J();
   }

@@ -17,26 +17,27 @@ namespace hybrid {
 // limits. The force is at most ForceLimits::max_force_N. It changes by at most max_slew_N_per_s times the
 // tick, except to zero.
 //
-// energy. It holds for tissue and for standing rigid objects without friction, damping or texture. The energy
-// that coupling and tissue store when the checks begin may be given to the hand. Let U(x) be the least energy
-// of coupling and tissue that the proxy can reach when the device is at x. The proxy of the tick before can
-// stay where it is, so the new energy is at most
-//     U' <= ½K|x' − q|² = U − F·(x' − x) + ½K|x' − x|²,    F = K (q − x) the force,
-// for any surface. So the work F·(x' − x) of the held force on the hand is at most the energy that was
-// stored, plus ½K|Δx|² in each tick. This share is the cost of holding a force for a tick (Colgate & Schenkel
-// 1997, K·T/2). An engine that adds no energy stays within it, stable or not: a coupling that is too stiff
-// for the loop buzzes on this share alone. With the clamp the same holds for the energy of the clamped
-// spring. A slew limit is a delay that changes the force by ΔF and may give |ΔF|·|Δx| more; this is added to
-// the allowed energy, and is zero where the limit did not act. Tissue is not solved to equilibrium within a
-// tick: a wave may store energy in it that the hand has not paid for, and return it. With tissue,
-// kTissueShare of all work in either direction is allowed. That bounds this engine's error and is no theorem.
+// energy. This invariant holds for tissue, and for standing rigid objects without friction, damping or
+// texture. The hand may get the energy that coupling and tissue store when the checks begin. Let U(x) be the
+// least energy of coupling and tissue that the proxy can reach when the device is at x. The proxy can stay
+// where it was in the tick before, so for any surface the new energy is at most
+//     U' <= ½K|x' − q|² = U − F·(x' − x) + ½K|x' − x|²,
+// where F = K (q − x) is the force. So the work F·(x' − x) of the held force on the hand is at most the
+// stored energy plus ½K|Δx|² in each tick. The term ½K|Δx|² is the cost of holding a force for a tick
+// (Colgate & Schenkel 1997, K·T/2). An engine that adds no energy stays within the bound, stable or not: with
+// a coupling that is too stiff for the loop, this term alone can feed a buzz. With the clamp the same holds
+// for the energy of the clamped spring. A slew limit delays a change ΔF of the force and may give |ΔF|·|Δx|
+// more. This is added to the allowed energy, and is zero where the limit did not act. Tissue is not solved to
+// equilibrium within a tick. A wave may store energy in it that the hand has not paid for, and return it. So
+// with tissue, kTissueShare of moved_J() is allowed besides. That bounds this engine's error and is no
+// theorem.
 //
-// outside. The proxy's centre is no nearer to a rigid object than its radius, within rounding.
+// outside. The proxy's centre is no nearer to a rigid object than the proxy's radius, within rounding.
 class TickInvariants {
  public:
   static constexpr double kTissueShare = 0.005;
 
-  // Call as the session begins. `world` must outlive this object.
+  // Call when the session begins. `world` must outlive this object.
   TickInvariants(const World& world, const WorldState& state);
 
   // After each tick.
@@ -47,17 +48,18 @@ class TickInvariants {
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] std::uint64_t not_finite() const { return not_finite_; }
   [[nodiscard]] double most_N() const { return most_N_; }
-  // Excess over the limits (N); 0: within.
+  // Excess over the limits (N); 0 if within them.
   [[nodiscard]] double over_force_N() const { return over_force_N_; }
   [[nodiscard]] double over_slew_N() const { return over_slew_N_; }
-  // The largest excess of given plus stored energy over the allowed energy (J), and its bound: rounding and
-  // the tissue's share.
+  // The largest excess of given plus stored energy over the allowed energy (J), and its bound. The bound is
+  // for rounding and, with tissue, for kTissueShare.
   [[nodiscard]] double excess_J() const { return excess_J_; }
   [[nodiscard]] double tolerance_J() const;
-  [[nodiscard]] double moved_J() const { return moved_J_; }  // work in either direction
-  [[nodiscard]] double given_J() const { return given_J_; }  // to the hand, by the end
-  // The most that was ever given, and the largest work of a single tick: a passivity controller compares the
-  // two.
+  // Sum over the ticks of the absolute work and of the coupling's stored energy.
+  [[nodiscard]] double moved_J() const { return moved_J_; }
+  [[nodiscard]] double given_J() const { return given_J_; }  // work on the hand, by the end
+  // The largest value of given_J() so far, and the largest work of a single tick. They serve to compare runs
+  // with and without a passivity controller.
   [[nodiscard]] double most_given_J() const { return most_given_J_; }
   [[nodiscard]] double worst_tick_J() const { return worst_tick_J_; }
   [[nodiscard]] double allowed_J() const { return allowed_J_; }  // by the end
@@ -76,7 +78,7 @@ class TickInvariants {
   double most_given_J_ = 0.0, worst_tick_J_ = 0.0;
   double given_J_ = 0.0, allowed_J_ = 0.0, excess_J_ = 0.0, moved_J_ = 0.0, stored_J_ = 0.0;
   glm::dvec3 force_N_{0.0}, device_m_{0.0};
-  double slewed_N_ = 0.0;  // distance of the force from the clamped one
+  double slewed_N_ = 0.0;  // distance of the force from the clamped force
 };
 
 }  // namespace hybrid

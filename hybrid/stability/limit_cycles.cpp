@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Stability and buzz, measured: a hand presses, somebody knocks, and the tool is watched.
+// Stability and buzz, measured: a hand presses, a knock follows, and the motion of the tool is watched.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,17 +19,18 @@ namespace {
 
 constexpr double kSoftestWall_N_per_m = 20.0, kStiffestWall_N_per_m = 1e7;
 constexpr double kSoftestBuzz_N_per_m = 100.0;
-constexpr double kDeepest_m = 2e-3;     // a soft wall is pressed less hard
-constexpr double kPressing_s = 0.3;     // that the hand takes to press
-constexpr double kSettling_s = 0.2;     // that the loop is given after that
-constexpr double kBlockPeriods = 40.0;  // of an undamped oscillation, over which the envelope is measured,
-constexpr double kMostBlock_s = 1.0;    // and no longer than this
+constexpr double kDeepest_m = 2e-3;  // depth of a press at most; so a soft wall is pressed less hard
+constexpr double kPressing_s = 0.3;  // time in which the hand presses
+constexpr double kSettling_s = 0.2;  // time in which the loop settles after that
+// Periods of an undamped oscillation in a block, over which the envelope is measured.
+constexpr double kBlockPeriods = 40.0;
+constexpr double kMostBlock_s = 1.0;  // length of a block at most
 
 }  // namespace
 
 namespace {
 
-// Presses from the surface to a depth, along a cosine: without a kink there is hardly anything to ring.
+// Presses from the surface to a depth, along a cosine. It has no kink, so it excites hardly any oscillation.
 class SmoothPress final : public device::Path {
  public:
   SmoothPress(const PressedScene& scene, double depth_m)
@@ -49,7 +50,8 @@ class SmoothPress final : public device::Path {
 device::SimulatedDeviceOptions options_of(const LoopSetting& setting) {
   device::SimulatedDeviceOptions options;
   options.mechanism = setting.mechanism;
-  // Read as it truly is, and rounded on the way to the tick: the tool's own motion is what a hand feels.
+  // The device reads the true position, and step() rounds it for the tick. The true motion is what the hand
+  // feels.
   options.mechanism.limits.resolution_m = 0.0;
   options.hand = setting.hand;
   options.hand.stiffness_N_per_m = held_loop(setting).hand_stiffness_N_per_m;
@@ -82,7 +84,7 @@ double HeldLoop::step(double extra_N) {
 
 void HeldLoop::settle() {
   const device::SampledLoop loop = held_loop(setting_);
-  // Where damping outweighs the wall it creeps there.
+  // A loop in which damping outweighs the wall creeps to its rest.
   const double creeping_s = 5.0 * (loop.damping_N_s_per_m + loop.wall_damping_N_s_per_m) / stiffness_;
   const int ticks =
       static_cast<int>(std::lround((kPressing_s + std::max(kSettling_s, creeping_s)) * setting_.rate_hz));
@@ -90,23 +92,24 @@ void HeldLoop::settle() {
 }
 
 void HeldLoop::knock(double amplitude_m) {
-  // N·s, of an undamped oscillator
+  // N·s; of an undamped oscillator with this amplitude
   const double impulse = amplitude_m * std::sqrt(stiffness_ * held_loop(setting_).mass_kg);
   const double ticks = std::max(1.0, std::ceil(impulse / (scene_.press_N() * setting_.period_s())));
   for (int n = 0; n < static_cast<int>(ticks); ++n) step(impulse / (ticks * setting_.period_s()));
 }
 
 double envelope_growth(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m) {
-  constexpr int kBlocks = 3;              // the first is left out: fast modes die in it
-  constexpr double kKnock = 0.02;         // of the depth
-  constexpr double kMostShare = 0.5;      // of the press: damping that is stronger may be cut
-  constexpr double kOutOfRange = 0.5;     // of the depth: from here contact may be lost
-  constexpr double kNothingLeft = 1e-14;  // of the power of the knock: rounding comes near
+  constexpr int kBlocks = 3;              // the first block does not count: fast modes die out in it
+  constexpr double kKnock = 0.02;         // amplitude of the knock, as a share of the depth
+  constexpr double kMostShare = 0.5;      // share of the press; a greater damping force may be cut
+  constexpr double kOutOfRange = 0.5;     // share of the depth; beyond it contact may be lost
+  constexpr double kNothingLeft = 1e-14;  // share of the knock's power; less may be rounding
   const double endless = std::numeric_limits<double>::infinity();
   HeldLoop loop(scene, setting, stiffness_N_per_m, press_for(scene, stiffness_N_per_m));
   const double rest = loop.rest_depth_m();
   loop.settle();
-  const double pace = std::sqrt(stiffness_N_per_m / held_loop(setting).mass_kg);  // rad/s, undamped
+  // Angular frequency without damping (rad/s).
+  const double pace = std::sqrt(stiffness_N_per_m / held_loop(setting).mass_kg);
   const double wall_damping = setting.wall_damping_N_s_per_m;
   const double uncut = 0.1 * kMostShare * stiffness_N_per_m * rest / (pace * wall_damping + 1e-9);
   loop.knock(std::min(kKnock * rest, uncut));
@@ -121,8 +124,8 @@ double envelope_growth(PressedScene& scene, const LoopSetting& setting, double s
       if (std::fabs(depth - rest) > kOutOfRange * rest) return endless;
       const double damping_N = wall_damping * std::fabs(depth - last) * setting.rate_hz;
       if (damping_N > kMostShare * stiffness_N_per_m * rest) return endless;
-      // The second difference knows neither the rest depth nor a slow drift towards it; Hann's window makes
-      // the power nearly independent of where in a period the block begins.
+      // The second difference does not contain the rest depth or a slow drift. Hann's window makes the power
+      // nearly independent of the phase at which the block begins.
       const double bend = depth - 2.0 * last + before;
       const double window = std::sin(std::numbers::pi * (n + 0.5) / ticks);
       p += bend * bend * window * window * window * window;
@@ -136,34 +139,34 @@ double envelope_growth(PressedScene& scene, const LoopSetting& setting, double s
 
 namespace {
 
-// What is left of a knock after a second or more: the tool's depth over the half second after that.
+// Knocks the tool, waits for at least a second, and records the tool's depth over the next half second.
 void watch_knock(PressedScene& scene, const LoopSetting& setting, double stiffness, double press_N,
                  std::vector<double>& depth_m) {
   constexpr double kLook_s = 0.5;
-  // A knock of a loop that is mostly damping creeps back.
+  // If the loop is mostly damping, the tool creeps back after a knock.
   const double wait_s = std::max(1.0, 12.0 * held_loop(setting).damping_N_s_per_m / stiffness);
   HeldLoop loop(scene, setting, stiffness, press_N);
   loop.settle();
-  // As deep again as the tool is pressed: on its way back to rest it passes whatever it could be caught in.
+  // The knock is as large as the depth, so that the tool passes all places where friction could hold it.
   loop.knock(loop.rest_depth_m());
   for (int k = 0; k < wait_s * setting.rate_hz; ++k) loop.step();
   depth_m.clear();
   for (int k = 0; k < kLook_s * setting.rate_hz; ++k) depth_m.push_back(loop.step());
 }
 
-// The presses that a stiffness is tried at: with an encoder several within one of its steps, because whether
-// friction holds the tool depends on where between two steps the hand wants it.
+// The presses with which a stiffness is tried. With an encoder there are several within one of its steps. The
+// reason is that the hand's target between two steps decides whether friction holds the tool.
 std::vector<double> presses(const PressedScene& scene, const LoopSetting& setting, double stiffness) {
   const double press = press_for(scene, stiffness), step_N = stiffness * setting.encoder_m();
   if (!(step_N > 0.0)) return {press};
-  const int count = scene.world().soft.empty() ? 6 : 2;  // tissue costs more, and gives way between the steps
+  const int count = scene.world().soft.empty() ? 6 : 2;  // tissue costs more, and it yields between the steps
   std::vector<double> all(static_cast<std::size_t>(count));
   for (int n = 0; n < count; ++n) all[static_cast<std::size_t>(n)] = press + step_N * n / count;
   return all;
 }
 
 bool comes_to_rest(PressedScene& scene, const LoopSetting& setting, double stiffness) {
-  constexpr double kRest = 0.02;  // of an encoder step, or of the depth: what moves less is at rest
+  constexpr double kRest = 0.02;  // share of an encoder step, or of the depth; a smaller motion is rest
   std::vector<double> depth;
   const double still =
       kRest * (setting.encoder_m() > 0.0 ? setting.encoder_m() : press_for(scene, stiffness) / stiffness);
@@ -182,7 +185,7 @@ std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopS
     return find_threshold(kSoftestWall_N_per_m, kStiffestWall_N_per_m, 2.0, 1e-3,
                           [&](double stiffness) { return envelope_growth(scene, setting, stiffness) < 0.0; });
   }
-  // A press that is hardly more than friction does not say where the tool rests.
+  // If the press is hardly larger than friction, the tool has no definite rest position.
   const double softest = std::max(kSoftestWall_N_per_m, 10.0 * setting.friction_N() / kDeepest_m);
   return find_threshold(softest, kStiffestWall_N_per_m, 1.3, 5e-3,
                         [&](double stiffness) { return comes_to_rest(scene, setting, stiffness); });

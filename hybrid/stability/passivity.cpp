@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Passivity, measured: the wall driven by sinusoids, and its energy counted.
+// Passivity, measured: sinusoids drive the wall, and its energy is counted.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -14,8 +14,8 @@ namespace hybrid {
 namespace {
 
 constexpr double kSoftest_N_per_m = 1.0, kStiffest_N_per_m = 1e7;
-constexpr double kPassiveStep = 1e-3;  // of the stiffness, where the bisection ends
-constexpr int kRateMemory = 24;        // ticks
+constexpr double kPassiveStep = 1e-3;  // relative step of the stiffness at which the bisection ends
+constexpr int kRateMemory = 24;        // ticks; more than the 16 depths of the velocity's estimate
 
 }  // namespace
 
@@ -30,8 +30,8 @@ CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenM
     const double seen = step > 0.0 ? std::round(depth / step) * step : depth;
     return glm::dot(scene.tick({.position_m = scene.at_depth(seen)}, dt).force_N, scene.normal());
   };
-  // The wall's memory first comes to what it is in the long run: sixteen depths of the velocity's estimate,
-  // or the account of its damping.
+  // The wall's memory must first reach its steady state: that of the velocity's estimate, or that of the
+  // account of its damping.
   const int settle =
       setting.delay_ticks +
       (setting.damping_account ? static_cast<int>(std::ceil(10.0 * kDampingMemory_s / dt)) : kRateMemory);
@@ -42,7 +42,7 @@ CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenM
     const double held = on_the_way.front();
     on_the_way.pop_front();
     if (n < settle) continue;
-    const double out = depth_at(n) - depth_at(n + 1);  // along the normal
+    const double out = depth_at(n) - depth_at(n + 1);  // motion along the normal
     energy.from_wall_J += held * out;
     energy.dissipated_J +=
         setting.mechanism.viscous_N_s_per_m * out * out / dt + setting.friction_N() * std::fabs(out);
@@ -52,15 +52,15 @@ CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenM
 
 namespace {
 
-// A grid of everything that could draw energy out.
+// A grid of motions that may draw energy out of the wall.
 std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& setting, double stiffness) {
   constexpr double kDeepestPress_m = 1e-3;
   const double step = setting.encoder_m();
   const double deep = std::min(kDeepestPress_m, scene.press_N() / stiffness);
   std::vector<DrivenMotion> all;
   if (!(step > 0.0)) {
-    // Small beside the depth, so that damping is not cut where it would pull. In a linear loop the phase
-    // counts only at Nyquist's frequency, where a sine of phase 0 stands still.
+    // The amplitude is small beside the depth, so that damping is not cut where it would pull. In a linear
+    // loop the phase matters only at Nyquist's frequency, at which a sine of phase 0 would stand still.
     for (int cycles = 1; cycles <= 64; ++cycles)
       all.push_back({.cycles = cycles, .centre_m = deep, .amplitude_m = 0.01 * deep, .phase_rad = 1.0});
     return all;
@@ -68,7 +68,8 @@ std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& 
   for (const double in_steps : {1.0 / 64, 1.0 / 8, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 64.0}) {
     const double amplitude = in_steps * step;
     if (amplitude > 0.9 * deep && !all.empty()) break;
-    for (const double place : {0.0, 0.25, 0.5}) {  // between two edges of the encoder, and on one
+    // In encoder steps: where the depth rounds to a step, and between.
+    for (const double place : {0.0, 0.25, 0.5}) {
       const double centre = (std::floor(deep / step) + place) * step;
       for (const int cycles : {1, 2, 3, 4, 5, 6, 7, 8}) {
         for (const double phase : {0.3, 1.0})
@@ -87,7 +88,7 @@ std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& 
 }  // namespace
 
 std::optional<double> measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting) {
-  std::size_t worst = 0;  // what was active at the last stiffness most likely is at this one
+  std::size_t worst = 0;  // the motion that drew energy at the last stiffness is tried first
   const auto passive = [&](double stiffness) {
     const std::vector<DrivenMotion> all = motions(scene, setting, stiffness);
     scene.restart(setting, stiffness);

@@ -14,7 +14,7 @@ std::vector<double> in_kN(std::vector<double> stiffness) {
   return stiffness;
 }
 
-// A sample between two gaps is drawn as a dot as wide as its line.
+// Measured points as dots. A sample between two gaps is drawn as a dot as wide as its line.
 Series dots(const BoundaryCurve& curve, const std::string& colour, double width) {
   constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
   Series series{.name = {}, .x = {}, .y = {}, .colour = colour, .width = width};
@@ -47,7 +47,7 @@ Figure stability_figure(const std::vector<BoundaryGroup>& groups, const std::str
         const BoundaryCurve& curve = panel.curves[n];
         p.series.push_back({curve.name, curve.x, in_kN(curve.theory_N_per_m), series_colour(n), 1.6});
       }
-      // On top of all lines, each with a white rim, so that dots stay apart from what they lie on.
+      // Dots are drawn on top of all lines, each with a white rim that separates it from the lines.
       for (std::size_t n = 0; n < panel.curves.size(); ++n) {
         p.series.push_back(dots(panel.curves[n], "#ffffff", kDot + 3.0));
         p.series.push_back(dots(panel.curves[n], series_colour(n), kDot));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Z-width: up to which stiffness a virtual wall is stable and passive, theory as lines and what was measured
-// as dots.
+// Z-width: the stiffness up to which a virtual wall is stable and passive. Theory is drawn as lines,
+// measurements as dots.
 #pragma once
 
 #include <string>
@@ -11,13 +11,13 @@
 namespace hybrid {
 
 struct BoundaryCurve {
-  std::string name;                       // "no delay"
-  std::vector<double> x, theory_N_per_m;  // rising x
+  std::string name;                       // for example "no delay"
+  std::vector<double> x, theory_N_per_m;  // x rises
   std::vector<double> measured_x, measured_N_per_m;
 };
 struct BoundaryPanel {
   std::string title;
-  std::vector<BoundaryCurve> curves;  // the same place in each panel has the same colour
+  std::vector<BoundaryCurve> curves;  // curves with the same index have the same colour in all panels
 };
 struct BoundaryGroup {
   std::string x_label;  // with its unit

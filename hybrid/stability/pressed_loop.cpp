@@ -15,7 +15,7 @@
 namespace hybrid {
 namespace {
 
-// The path as the hand would walk it, with the tool exactly there: where is something felt first?
+// The first contact on the scene's path, if the tool follows the path exactly.
 struct FirstTouch {
   glm::dvec3 free_m{0.0}, touch_m{0.0}, normal{0.0};
 };
@@ -87,7 +87,7 @@ PressedScene::PressedScene(const Scene& scene, const Progress& progress)
   built_.state.reset();
   begin_ = copy_state(world_, *rest);
   begin_session(scene, world_, *begin_, free_m_);
-  begin_->limit.elapsed_s = world_.limits.soft_start_s;  // switched on a while ago
+  begin_->limit.elapsed_s = world_.limits.soft_start_s;  // the soft start is over
   state_ = copy_state(world_, *begin_);
   press_N_ = std::min(press_N_, 0.4 * world_.limits.max_force_N);
 }

@@ -16,17 +16,20 @@
 
 namespace hybrid {
 
-// One loop to be measured, but for the stiffness. The scene's own device and hand do not count.
+// The parameters of a loop that is measured, without its stiffness. The scene's own device and hand do not
+// count.
 struct LoopSetting {
   device::Mechanism mechanism = linear_mechanism();
   device::HandModel hand{};
   double rate_hz = 1000.0;
-  int delay_ticks = 0;                  // from sample to force
-  double wall_damping_N_s_per_m = 0.0;  // B, of every rigid surface
-  bool damping_account = false;         // of World: the care that keeps B passive; theory knows B without
+  int delay_ticks = 0;                  // from sample to force, in ticks
+  double wall_damping_N_s_per_m = 0.0;  // B; of every rigid surface
+  // World::damping_account, which keeps B passive; theory has B without it.
+  bool damping_account = false;
 
-  static constexpr double kNoHand_N_per_m = 1.0;  // a hand without a spring presses by one of this
-  // The Premium's mass; no friction, no encoder step, no limit: what theory answers.
+  // Stiffness of the spring with which a hand without one presses.
+  static constexpr double kNoHand_N_per_m = 1.0;
+  // Mass of the Premium; no friction, no encoder step, no force limit. Theory covers this mechanism.
   static device::Mechanism linear_mechanism();
   [[nodiscard]] double period_s() const { return 1.0 / rate_hz; }
   [[nodiscard]] double friction_N() const { return mechanism.limits.friction_N; }
@@ -34,28 +37,29 @@ struct LoopSetting {
   [[nodiscard]] bool linear() const { return friction_N() == 0.0 && encoder_m() == 0.0; }
 };
 
-// What theory calls the same: with the hand for stability, without it for passivity.
+// The loop of theory for this setting. For stability it includes the hand (held_loop), for passivity it does
+// not (bare_loop).
 device::SampledLoop held_loop(const LoopSetting& setting);
 device::SampledLoop bare_loop(const LoopSetting& setting);
 
-// A scene, built once, touched again and again from the same state.
+// A scene that is built once and touched again and again from the same state.
 class PressedScene {
  public:
-  // Throws SceneError: what build_scene() refuses, or the path touches nothing.
+  // Throws SceneError if build_scene() refuses the scene, or if the path touches nothing.
   explicit PressedScene(const Scene& scene, const Progress& progress = {});
 
-  // Back to the beginning, with the tool above the place, for a coupling of this stiffness.
+  // Returns to the start, with the tool above the place and a coupling of this stiffness.
   void restart(const LoopSetting& setting, double stiffness_N_per_m);
   TickResult tick(const device::DeviceState& input, double dt_s) noexcept {
     return haptic_tick(world_, *state_, input, dt_s);
   }
 
-  // `depth_m` into the surface, along its normal.
+  // The position `depth_m` below the surface, along its normal.
   [[nodiscard]] glm::dvec3 at_depth(double depth_m) const { return touch_m_ - depth_m * normal_; }
   [[nodiscard]] double depth_of(const glm::dvec3& point_m) const;
   [[nodiscard]] const glm::dvec3& normal() const { return normal_; }
   [[nodiscard]] const World& world() const { return world_; }
-  // How hard the measurements press (N): well within the scene's limit.
+  // Force with which the measurements press (N): well within the scene's limit.
   [[nodiscard]] double press_N() const { return press_N_; }
 
  private:
@@ -68,44 +72,44 @@ class PressedScene {
 
 // ---- passivity --------------------------------------------------------------------------------------------
 
-// A motion that no hand makes: at the ticks a sinusoid about a depth, between them even, because of all
-// motions through the same samples that is the one on which the mechanism's damping costs least.
+// A motion that no hand makes. At the ticks it is a sinusoid about a depth, and between them it is linear. Of
+// all motions through the same samples, the mechanism's damping dissipates least on the linear one.
 struct DrivenMotion {
-  int cycles = 1, ticks = 128;  // so many whole cycles in so many ticks
+  int cycles = 1, ticks = 128;  // `cycles` whole cycles take `ticks` ticks
   double centre_m = 1e-3;       // depth
-  double amplitude_m = 1e-5;    // less than the depth
+  double amplitude_m = 1e-5;    // less than centre_m
   double phase_rad = 0.0;
 };
 
-struct CycleEnergy {          // of one period of the motion, once it repeats (J)
-  double from_wall_J = 0.0;   // Σ F(k)·(x(k+1) − x(k)), F what the motors hold from k to k + 1
-  double dissipated_J = 0.0;  // by the mechanism: b·Δx²/T + f·|Δx| a tick
+struct CycleEnergy {          // of one period of the motion in its steady state (J)
+  double from_wall_J = 0.0;   // Σ F(k)·(x(k+1) − x(k)); the motors hold F(k) from tick k to k + 1
+  double dissipated_J = 0.0;  // by the mechanism: b·Δx²/T + f·|Δx| in each tick
 };
-// Goes on from where the scene is, which was restarted with this setting.
+// Continues from the scene's state. The scene must have been restarted with this setting.
 CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenMotion& motion);
 
 // The largest stiffness of the coupling (N/m) at which no motion of a fine grid gets more energy out of the
-// wall than the mechanism dissipates, by bisection to 0.1 %: all frequencies up to Nyquist's, and with an
-// encoder step also amplitudes from 1/64 of it and all places within it. 0: not even the softest (1 N/m);
-// empty: at all up to 10 MN/m.
+// wall than the mechanism dissipates. Found by bisection to 0.1 %. The grid has all frequencies up to
+// Nyquist's. With an encoder step it also has amplitudes from 1/64 of the step on, and several places within
+// the step. 0: even the softest (1 N/m) is not passive. Empty: passive at all up to 10 MN/m.
 std::optional<double> measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting);
 
 // ---- stability --------------------------------------------------------------------------------------------
 
-// A simulated device in a simulated hand that presses it into the place, slowly and smoothly, and then holds
-// still.
+// A simulated device in a simulated hand. The hand presses it into the place, slowly and smoothly, and then
+// holds still.
 class HeldLoop {
  public:
-  // `press_N` is what the wall answers with at rest. A hand without a spring presses by a spring of 1 N/m.
+  // `press_N` is the wall's force at rest. A hand without a spring presses by a spring of 1 N/m.
   HeldLoop(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m, double press_N);
 
-  // One tick, with a force of somebody else's added to the motors' (N, out of the surface). Returns how deep
-  // the tool truly is (m), not as the encoders say.
+  // Does one tick. `extra_N` is an external force in addition to the motors' (N, out of the surface). Returns
+  // the tool's true depth (m), not that of the encoders.
   double step(double extra_N = 0.0);
   [[nodiscard]] double rest_depth_m() const { return rest_m_; }
-  // Until the hand has arrived and a while longer.
+  // Runs until the hand has arrived, and a while longer.
   void settle();
-  // The tool is knocked: a short force no larger than the press, that makes an oscillation of about
+  // Knocks the tool: a short force, no larger than the press, that causes an oscillation of about
   // `amplitude_m`.
   void knock(double amplitude_m);
 
@@ -116,30 +120,31 @@ class HeldLoop {
   std::unique_ptr<device::HapticDevice> device_;
 };
 
-// The largest stiffness of the coupling (N/m) at which a knock dies out. In a linear loop (no friction, no
-// encoder) by the sign of the rate at which the envelope grows, far from anything that limits it: bisection
-// to 0.1 %. Otherwise by whether the tool comes to rest after it, at several presses within one encoder step:
-// the first of stiffnesses 1.3 apart at which it does not, then bisection to 0.5 %. 0: not even the softest
-// (20 N/m, or pressed 2 mm deep with ten times the friction); empty: at all up to 10 MN/m.
+// The largest stiffness of the coupling (N/m) at which a knock dies out. For a linear loop (no friction, no
+// encoder) the sign of the envelope's growth rate decides, far from all limits. The bisection ends at 0.1 %.
+// Otherwise the tool must come to rest after the knock, at several presses within one encoder step.
+// Stiffnesses 1.3 apart are tried until it does not, then a bisection ends at 0.5 %. 0: not even the softest
+// is stable (20 N/m, or the one at which ten times the friction presses 2 mm deep). Empty: stable at all up
+// to 10 MN/m.
 std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting);
 
-// The rate (1/s) at which the envelope of a knock grows in a linear loop; +infinity where it left the linear
-// range, −infinity where nothing is left of it.
+// Growth rate (1/s) of a knock's envelope in a linear loop. +infinity if it left the linear range, −infinity
+// if the oscillation has vanished.
 double envelope_growth(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m);
 
 // ---- buzz -------------------------------------------------------------------------------------------------
 
-// The most felt vibration of the tool half a second long, a second after a knock on a steady press; the worst
-// of several presses within one encoder step.
+// The vibration of the tool that is felt most, over half a second, a second after a knock on a steady press.
+// It is the worst of several presses within one encoder step.
 Vibration pressed_vibration(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m);
 
 // The stiffness of the coupling at which a steady press begins to buzz, that is to vibrate so that a hand
-// feels it: the first of a fine row of stiffnesses from 100 N/m (1.15 apart; on tissue 1.6), then bisection
-// to 1 %. At none of the row below it does it buzz.
+// feels it. Stiffnesses are tried from 100 N/m on, 1.15 apart (on tissue 1.6), up to the first that buzzes.
+// Then a bisection ends at 1 %. None of the lower stiffnesses that were tried buzzes.
 struct Buzz {
   std::optional<double> begins_N_per_m;  // empty: nowhere up to stiffest_N_per_m
   double stiffest_N_per_m = 0.0;
-  Vibration vibration;  // where it begins
+  Vibration vibration;  // at begins_N_per_m
 };
 Buzz measured_buzz(PressedScene& scene, const LoopSetting& setting);
 

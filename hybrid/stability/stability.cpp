@@ -47,12 +47,12 @@ LoopSetting bare_setting(double viscous, double rate_hz, int delay) {
   return setting;
 }
 
-// ---- the plan: rows without what is measured ------------------------------------------------------------
+// ---- the plan: rows without measurements ----------------------------------------------------------------
 
 class Plan {
  public:
   explicit Plan(const Scene& scene) : rate_hz_(scene.rate_hz) {
-    const bool ideal = scene.device_model == device::DeviceModel::ideal;  // has no loop to speak of
+    const bool ideal = scene.device_model == device::DeviceModel::ideal;  // an ideal device has no dynamics
     model_ = ideal ? device::DeviceModel::premium_1_5 : scene.device_model;
   }
 
@@ -68,7 +68,7 @@ class Plan {
       }
       for (const double wall : {2.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 70.0}) {
         setting.wall_damping_N_s_per_m = wall;
-        if (device::largest_stable_stiffness(held_loop(setting)) > 0.0)  // else there is no K to be found
+        if (device::largest_stable_stiffness(held_loop(setting)) > 0.0)  // otherwise there is no stable K
           add(StabilitySweep::wall_damping, Boundary::stable, setting);
       }
     }
@@ -87,8 +87,9 @@ class Plan {
     curves();
   }
 
-  // Young's modulus is of the first soft object; the others keep their ratio to it. Tissue is in series with
-  // the coupling, so where it gives way most no coupling buzzes: hence also the other way round.
+  // Two measurements: the stiffness that buzzes at a given modulus, and the modulus that buzzes under a stiff
+  // coupling. The second is needed because tissue is in series with the coupling: on very soft tissue no
+  // coupling buzzes. The modulus is that of the first soft object; the others keep their ratio to it.
   void soft() {
     constexpr double kStiffCoupling_N_per_m = 20e3;
     for (const double young : {1e3, 1e4, 1e5}) {
@@ -212,7 +213,7 @@ class Plan {
 
 // ---- measuring ------------------------------------------------------------------------------------------
 
-// Every material as much stiffer or softer as brings the first object's own to `young_Pa`.
+// The scene with all materials scaled by one factor, so that the first soft object's modulus is `young_Pa`.
 Scene with_young(Scene scene, double young_Pa) {
   scene.materials.try_emplace("");  // what an object has that names none
   const double factor = young_Pa / scene.materials[scene.soft.front().material].young_Pa;
@@ -220,7 +221,7 @@ Scene with_young(Scene scene, double young_Pa) {
   return scene;
 }
 
-// The modulus at which the scene's tissue begins to buzz under a coupling of the row's stiffness.
+// Measures the modulus at which the scene's tissue begins to buzz under a coupling of the row's stiffness.
 void measure_modulus(const Scene& scene, StabilityRow& row) {
   constexpr double kSoftest_Pa = 1e3, kStiffest_Pa = 1e8;
   row.stiffest = kStiffest_Pa;
@@ -252,7 +253,8 @@ void measure(PressedScene& scene, StabilityRow& row) {
   }
 }
 
-// A fixed and a varied coupling are two kinds.
+// Keeps the first row of each sweep and kind. Rows with a given coupling and rows with a varied one count as
+// two kinds.
 void keep_first_of_each(std::vector<StabilityRow>& rows) {
   std::set<std::tuple<StabilitySweep, Boundary, bool>> seen;
   std::erase_if(rows, [&seen](const StabilityRow& row) {

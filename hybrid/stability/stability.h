@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the haptic loop of a scene stops being stable, passive and calm: measured, beside theory.
+// Boundaries up to which the haptic loop of a scene is stable, passive and free of buzz: measured, beside
+// theory.
 #pragma once
 
 #include <optional>
@@ -14,16 +15,16 @@ namespace hybrid {
 enum class Boundary : std::uint8_t { stable, passive, buzz };
 std::string_view name_of(Boundary kind) noexcept;
 
-// What is varied: the rows of one sweep lie on the same curves.
+// The parameter that is varied. The rows of one sweep lie on the same curves.
 enum class StabilitySweep : std::uint8_t {
-  damping,       // b of the mechanism, nobody's hand
-  wall_damping,  // B
+  damping,       // b of the mechanism, without a hand
+  wall_damping,  // B of the wall
   rate,
-  grip,          // the scene's device without friction and encoder, held
+  grip,          // hands on the scene's device without friction and encoder
   quantisation,  // friction and encoder
-  account,       // B with the care that the tick takes of it
-  device,        // each device as it is, held
-  tissue,        // the scene's soft objects, softer and stiffer
+  account,       // B with the tick's account of damping
+  device,        // each device as it is, in a hand
+  tissue,        // stiffness of the scene's soft objects
 };
 std::string_view title_of(StabilitySweep sweep) noexcept;
 
@@ -32,28 +33,31 @@ struct StabilityRow {
   Boundary kind = Boundary::stable;
   LoopSetting setting;
   std::string grip = "none", device;  // device: empty where it is no real one's model
-  // The stiffness of the virtual coupling (N/m) up to which the loop is so; of buzz that at which it begins.
-  std::optional<double> measured;  // empty: nowhere up to `stiffest`
+  // Stiffness of the virtual coupling (N/m) up to which the loop is stable or passive, or at which buzz
+  // begins.
+  std::optional<double> measured;  // empty: there is no boundary up to `stiffest`
   double stiffest = 1e7;
-  std::optional<double> theory;       // empty: none is exact
-  std::optional<double> lower_bound;  // what theory promises where it is not exact
+  std::optional<double> theory;       // empty: no theory is exact
+  std::optional<double> lower_bound;  // bound that theory guarantees if it is not exact
   std::string theory_name;
-  // Of tissue: Young's modulus of the first soft object; or the coupling is this stiff, and what is measured
-  // is the modulus (Pa) at which it begins to buzz, up to `stiffest`.
+  // Only of tissue. Either young_Pa is set: Young's modulus of the first soft object. Or coupling_N_per_m is
+  // set: then `measured` and `stiffest` are moduli (Pa), and `measured` is the one at which buzz begins.
   std::optional<double> young_Pa, coupling_N_per_m;
-  // ---- of buzz ----
-  Vibration vibration;                                     // where it begins
-  std::optional<double> nominal_N_per_m, felt_at_nominal;  // at the device's nominal stiffness; felt above 1
+  // ---- only of buzz ----
+  Vibration vibration;  // at the boundary
+  // At the device's nominal stiffness; felt if above 1.
+  std::optional<double> nominal_N_per_m, felt_at_nominal;
 
-  [[nodiscard]] double damping_N_s_per_m() const;     // b of theory: with the hand's, but for passivity
+  // Damping b in theory. It includes the hand's, except for passivity.
+  [[nodiscard]] double damping_N_s_per_m() const;
   [[nodiscard]] std::optional<double> error() const;  // measured / theory − 1
 };
 
-struct TheoryCurve {  // of a sweep, for one delay
+struct TheoryCurve {  // of one sweep, for one delay
   StabilitySweep sweep = StabilitySweep::damping;
   Boundary kind = Boundary::stable;
   int delay_ticks = 0;
-  std::vector<double> x, stiffness_N_per_m;  // x: what is varied, SI
+  std::vector<double> x, stiffness_N_per_m;  // x: the varied parameter in SI units
 };
 
 struct StabilityReport {
@@ -61,26 +65,27 @@ struct StabilityReport {
   std::vector<StabilityRow> rows;
   std::vector<TheoryCurve> curves;
   double seconds = 0.0, processor_seconds = 0.0;
-  int stopped_by = 0;  // the signal that ended the measurement; the rows are then those that were done
+  int stopped_by = 0;  // the signal that ended the measurement early; rows not measured are missing
 };
 
 struct StabilityOptions {
-  bool quick = false;  // of each sweep and kind the first row alone
+  bool quick = false;  // only the first row of each sweep and kind
   Progress progress{};
 };
 
-// Measures them all: over rigid scenes the whole plan (two to five minutes; quick: some seconds), over scenes
-// with something soft where they begin to buzz: with Young's modulus at 1, 10 and 100 kPa, and with a stiff
-// coupling by Young's modulus. A signal (StopOnSignal) ends it early. Throws SceneError (see PressedScene).
+// Runs all measurements. With a rigid scene this is the whole plan (two to five minutes; quick: some
+// seconds). With soft objects it is where they begin to buzz: the stiffness of the coupling at Young's moduli
+// of 1, 10 and 100 kPa, and Young's modulus under a stiff coupling. A signal (StopOnSignal) ends it early.
+// Throws SceneError (see PressedScene).
 StabilityReport measure_stability(const Scene& scene, const StabilityOptions& options = {});
 
-// What theory and measurement are compared over: rows that have a theory, and how far the worst is off.
+// Comparison with theory: the number of rows that have a theory, and the largest error.
 struct Agreement {
   int rows = 0;
   double worst = 0.0;  // |error|
 };
 Agreement agreement(const StabilityReport& report, Boundary kind);
-// Rows measured below their lower bound (by more than the precision of the bisection).
+// Number of rows measured below their lower bound by more than the precision of the bisection.
 int below_bound(const StabilityReport& report);
 
 }  // namespace hybrid

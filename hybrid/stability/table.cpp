@@ -54,7 +54,7 @@ std::string number(const std::optional<double>& value) {
 }
 
 std::string measured_text(const StabilityRow& row) {
-  const double unit = row.coupling_N_per_m ? 1e3 : 1.0;  // moduli in kPa
+  const double unit = row.coupling_N_per_m ? 1e3 : 1.0;  // moduli are shown in kPa
   return row.measured ? fmt::format("{:.0f}", *row.measured / unit)
                       : fmt::format("> {:.0f}", row.stiffest / unit);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What was measured of stability, as JSON and as a person would read it.
+// The measurements of stability as JSON and as text for a person.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -12,7 +12,7 @@ namespace hybrid {
 // {scene, seconds, agreement{stable{rows, worst_error}, passive{…}}, rows_below_bound, rows[…]}
 void add_to_json(const StabilityReport& report, nlohmann::ordered_json& json);
 
-// Tables, one a sweep, and what they say in one line each.
+// One table for each sweep, with its result in one line.
 std::string stability_tables(const StabilityReport& report);
 
 }  // namespace hybrid

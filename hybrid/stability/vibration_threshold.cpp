@@ -37,7 +37,7 @@ Vibration strongest_vibration(std::span<const double> motion_m, double rate_hz) 
   const std::size_t n = motion_m.size();
   Vibration strongest;
   if (n < 16) return strongest;
-  // The line of least squares through all samples.
+  // Fits a line by least squares to all samples.
   const double middle = 0.5 * static_cast<double>(n - 1);
   double mean = 0.0, moment = 0.0, spread = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -52,8 +52,8 @@ Vibration strongest_vibration(std::span<const double> motion_m, double rate_hz) 
     const double away = motion_m[i] - mean - moment / spread * (static_cast<double>(i) - middle);
     windowed[i] = away * (0.5 - 0.5 * std::cos(kTwoPi * share));
   }
-  // A sinusoid of amplitude a has |X|² of (a·n/4)² at its line and a quarter of that at each neighbour: 1.5
-  // times in all, wherever between two lines it lies (to 1 %).
+  // With Hann's window, a sinusoid of amplitude a has |X|² = (a·n/4)² at its line and a quarter of that at
+  // each neighbour. The sum is 1.5 times the first, wherever between two lines the frequency lies (to 1 %).
   const double scale = 4.0 / (static_cast<double>(n) * std::sqrt(1.5));
   const auto last =
       std::min<std::size_t>(n / 2, static_cast<std::size_t>(1000.0 * static_cast<double>(n) / rate_hz));
@@ -63,7 +63,8 @@ Vibration strongest_vibration(std::span<const double> motion_m, double rate_hz) 
     const double frequency = static_cast<double>(k) * rate_hz / static_cast<double>(n);
     const double amplitude = scale * std::sqrt(before + here + after);
     const double felt = amplitude / vibration_threshold_m(frequency);
-    // Only where the spectrum peaks: on a peak's upper flank the threshold falls faster than the power.
+    // Only peaks of the spectrum count: on the upper flank of a peak the threshold falls faster than the
+    // power.
     const bool peak = here >= before && here >= after;
     if (peak && felt > strongest.felt) strongest = {frequency, amplitude, felt};
     before = here;

@@ -28,7 +28,7 @@ class Cases {
   std::vector<DriveCase> list;
 };
 
-// Stiffness, dt and motion, each with each.
+// Crosses all values of stiffness, dt and motion with one another.
 void cross_loops(Cases& cases, SceneKind kind) {
   for (const double stiffness : {1.0, 1e3, 25e3, 1e6}) {
     for (const double rate : {10e3, 1e3, 100.0}) {
@@ -43,7 +43,7 @@ void cross_loops(Cases& cases, SceneKind kind) {
   }
 }
 
-// With the controller on.
+// Loops with the passivity controller on.
 void passive_loops(Cases& cases, SceneKind kind) {
   for (const double stiffness : {1e3, 25e3, 1e6}) {
     SceneSetting s;
@@ -110,7 +110,7 @@ void sizes(Cases& cases, SceneKind kind) {
   }
 }
 
-// Far away every coordinate is rounded to 1e-10 m, and the coupling makes a force of that.
+// Far away every coordinate is rounded to 1e-10 m, and the coupling turns this into a force.
 void far_away(Cases& cases, SceneKind kind) {
   SceneSetting here;
   here.kind = kind;
@@ -148,8 +148,8 @@ void meshes(Cases& cases, SceneKind kind, bool quick) {
     cases.add(lines, motion, "no triangle with an area at all");
 }
 
-// A mixed one would spend a quarter of an hour on carving 134 million voxels, and show nothing that these do
-// not.
+// A mixed scene is left out: carving 134 million voxels would take a quarter of an hour, and it shows nothing
+// new.
 void large(Cases& cases, SceneKind kind) {
   if (kind == SceneKind::mixed) return;
   SceneSetting s;
@@ -180,7 +180,7 @@ std::vector<DriveCase> drive_cases(bool quick) {
     meshes(cases, kind, quick);
   }
   for (const SceneKind kind : kSceneKinds) {
-    if (!quick) large(cases, kind);  // last, because they take long
+    if (!quick) large(cases, kind);  // comes last, because it takes long
   }
   return std::move(cases.list);
 }

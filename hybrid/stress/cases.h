@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the extremes suite crosses: the cases that are driven, and the scenes that must be refused.
+// The cases of the extremes suite: scenes that are driven, and scenes that must be refused.
 #pragma once
 
 #include <string>
@@ -14,19 +14,19 @@ struct DriveCase {
   SceneSetting scene;
   Motion motion = Motion::path;
   std::string setting;   // in words
-  SceneSetting like{};   // for `same`: the scene that it must feel like,
-  double same_N = -1.0;  // within this; negative: it is not asked
+  SceneSetting like{};   // for oracle `same`: the scene whose forces it must have
+  double same_N = -1.0;  // greatest difference of the forces; negative: not compared
 };
 
-// Every axis to its ends, and the axes that matter to a loop (stiffness, dt, motion) crossed with one
-// another. `quick`: the ends, each with one motion.
+// Takes every axis to its ends, and crosses the axes that matter to a loop (stiffness, dt, motion) with one
+// another. `quick` leaves out the crossed loops, the large objects and the million coincident triangles.
 std::vector<DriveCase> drive_cases(bool quick);
 
-// A scene of which one line is wrong.
+// A scene with one wrong line.
 struct RefusedCase {
   SceneKind kind = SceneKind::rigid;
   std::string setting;
-  std::string scene;  // the whole text
+  std::string scene;  // the whole text of the scene
 };
 std::vector<RefusedCase> refused_cases();
 

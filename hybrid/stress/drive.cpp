@@ -18,9 +18,9 @@ namespace hybrid {
 namespace {
 
 constexpr int kJumps = 300, kThroughs = 30, kTicksThere = 5;
-constexpr double kFar = 1000.0;  // units: a metre, where a unit is a millimetre
+constexpr double kFar = 1000.0;  // units; a metre if a unit is a millimetre
 constexpr int kTicksOut = 100, kMostRest = 4000;
-constexpr std::uint64_t kLookEvery = 16;  // ticks between two looks at how far tissue has moved
+constexpr std::uint64_t kLookEvery = 16;  // ticks between two measurements of the largest displacement
 constexpr double kAfterPath_s = 0.1;
 constexpr int kStallEvery = 40, kNoNumberEvery = 7;
 constexpr std::array<double, 5> kStalls_s{1e-3, 3e-3, 10e-3, 30e-3, 100e-3};
@@ -59,7 +59,7 @@ class Drive {
   }
   glm::dvec3 place(double x, double y, double z) const { return middle_m_ + unit_m_ * glm::dvec3(x, y, z); }
 
-  // The hand, and the device that it holds.
+  // Plays the hand on its path and the device that it holds.
   void follow(Motion motion) {
     const auto path = scene_path(scene_);
     const auto device = scene_device(scene_, path);
@@ -90,7 +90,7 @@ class Drive {
   }
 
   void go_through() {
-    constexpr double kX = -9.0, kY = -9.0;  // beside the ball, over the block
+    constexpr double kX = -9.0, kY = -9.0;  // a place on the block, beside the ball
     begin(place(kX, kY, kFreeHeight));
     result_.lowest_m = std::numeric_limits<double>::max();
     for (int n = 0; n < kThroughs * kTicksThere; ++n) {
@@ -105,7 +105,7 @@ class Drive {
   void leave() {
     const auto see = [this](const glm::dvec3& device_m) { return tick(device_m, 1e-3); };
     const glm::dvec3 away = lead_out(world_, state_, middle_m_, kReach * unit_m_, see);
-    // A few ticks longer than tissue needs, so that it is seen to stay at rest.
+    // Goes on for a few ticks after tissue has come to rest, to see that it stays at rest.
     TickResult felt;
     for (int n = 0, rested = 0; n < kMostRest && rested < kTicksOut; ++n) {
       felt = tick(away, 1e-3);

@@ -27,19 +27,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPassiveRounding_J = 1e-7;  // that the controller lets pass beside one tick's worst
-constexpr double kLongTick_us = 250e3;       // processor time: a hang, on any machine
-constexpr double kBack = 0.01;               // of the spacing: tissue that is nearer to rest has come back
-constexpr std::size_t kQuickEvery = 7;       // cases of the table, of which the quick share takes one
+// Allowed beyond one tick's worst case; rounding of the controller.
+constexpr double kPassiveRounding_J = 1e-7;
+constexpr double kLongTick_us = 250e3;  // processor time; on any machine a longer tick is a hang
+// Share of the spacing; tissue with a smaller displacement is back at rest.
+constexpr double kBack = 0.01;
+constexpr std::size_t kQuickEvery = 7;  // the quick run takes one of so many cases
 
-// "…scene.toml:12:8: what; what to do"
+// Has the text the form "…scene.toml:12:8: what; what to do"?
 bool says_where_what_and_remedy(const std::string& text) {
   constexpr std::string_view kFile = "scene.toml:";
   constexpr std::size_t kFewWords = 8;
   std::size_t at = text.find(kFile);
   if (at == std::string::npos) return false;
   at += kFile.size();
-  for (int number = 0; number < 2; ++number) {  // line and column
+  for (int number = 0; number < 2; ++number) {  // number of the line, then of the column
     const std::size_t end = text.find_first_not_of("0123456789", at);
     if (end == std::string::npos || end == at || text[end] != ':') return false;
     at = end + 1;
@@ -48,7 +50,7 @@ bool says_where_what_and_remedy(const std::string& text) {
   return remedy != std::string::npos && remedy > at + kFewWords && text.size() > remedy + kFewWords;
 }
 
-// After the folder, which is no part of what is said.
+// The text without the folder's name, which differs from run to run.
 std::string without_folder(const std::string& text) {
   const std::size_t at = text.find("scene.toml");
   return at == std::string::npos ? text : text.substr(at);
@@ -60,7 +62,7 @@ void write_text(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
 }
 
-// Meshes that no surface can be made of.
+// Writes meshes from which no surface can be made.
 void write_bad_meshes(const fs::path& folder) {
   const polygon::TriangleMesh ball = polygon::make_ball_mesh(6e-3, 1);
   polygon::TriangleMesh nan = ball;
@@ -115,7 +117,7 @@ class Suite {
       const DriveResult first = run_once(c.scene, c.motion);
       judge(c, first);
       if (c.same_N >= 0.0) judge_same(c, first);
-      if (c.scene.shape == BlockShape::large) return;  // once is minutes
+      if (c.scene.shape == BlockShape::large) return;  // one run takes minutes
       const DriveResult second = run_once(c.scene, c.motion);
       judge_hash(first, second);
     } catch (const SceneError& e) {
@@ -125,7 +127,8 @@ class Suite {
     }
   }
 
-  // Whether what it takes is free: to fill a machine that others use is no test. Refused is another matter.
+  // Is there enough free memory for the case? A test must not fill a machine that others use. A case that
+  // will be refused is run in any case.
   bool enough_memory() {
     const double free = static_cast<double>(available_memory_bytes());
     const double takes = static_cast<double>(soft_touched_bytes({512, 512, 512}));
@@ -187,7 +190,7 @@ class Suite {
 
   void judge_held(const DriveCase& c, const DriveResult& r) {
     const bool soft = c.scene.kind != SceneKind::rigid;
-    // Tissue gives way down to what holds it: the lowest layer of voxels, whose middles are 9 below.
+    // Tissue yields down to its lowest layer of voxels, which is held. The centres of these voxels are at −9.
     const double least = (soft ? -9.0 : kTouchHeight) * c.scene.unit_m -
                          (1e-6 * c.scene.unit_m + 64.0 * 1e-16 * glm::length(c.scene.origin_m));
     say("held", r.lowest_m >= least,
@@ -202,7 +205,7 @@ class Suite {
           fmt::format("{:.3g} N left, of {:.3g}", r.unbalanced_N, r.most_N));
       return;
     }
-    // What 512 voxels a side still have to relax is a matter of the budget.
+    // For 512 voxels a side, the budget decides how much is still to be relaxed.
     const bool rests =
         c.scene.shape == BlockShape::large ? r.left_moved_m < 0.1 * r.most_moved_m : r.asleep && back;
     say("settled", r.unbalanced_N == 0.0 && rests,
@@ -224,7 +227,8 @@ class Suite {
         fmt::format("forces apart by {:.3g} N of {:.3g} at most", apart, r.most_N));
   }
 
-  // Where it leaves the tool, and whether it moves or rubs, only its author knows: what holds of any scene.
+  // A scene of the user's own is judged only by what holds for any scene. It is unknown where it leaves the
+  // tool and, unless `still`, how its objects move.
   void own_scene() {
     const Scene scene = load_scene(options_.scene);
     const bool still = std::none_of(scene.rigid.begin(), scene.rigid.end(), [](const RigidDescription& d) {
@@ -267,7 +271,7 @@ class Suite {
   ScratchFolder folder_{"extremes"};
   std::vector<ExtremeRow> rows_;
   std::string test_case_, setting_;
-  std::string like_;  // of the scene that these were felt in
+  std::string like_;  // text of the scene that has like_forces_
   std::vector<glm::dvec3> like_forces_;
 };
 

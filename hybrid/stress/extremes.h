@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The extremes suite: rigid, soft and mixed scenes with one setting, or several, taken to its end; and what
-// must hold of each. A case ends in a right answer or in a clear refusal.
+// The extremes suite: rigid, soft and mixed scenes in which one or several settings have extreme values, and
+// oracles for each. A case must end in a right answer or in a clear refusal.
 #pragma once
 
 #include <filesystem>
@@ -14,44 +14,43 @@
 namespace hybrid {
 
 struct ExtremeRow {
-  std::string test_case;  // scene and motion: "mixed: hand on a path"
-  std::string setting;    // what was taken to its end: "stiffness 25000 N/m, dt 0.1 ms"
-  std::string oracle;     // what must hold
-  std::string outcome;    // what was seen, in figures and words
+  std::string test_case;  // scene and motion, for example "mixed: hand on a path"
+  std::string setting;    // the extreme setting, for example "stiffness 25000 N/m, dt 0.1 ms"
+  std::string oracle;     // name of the oracle
+  std::string outcome;    // result in figures and words
   bool ok = false;
 };
 
 // The oracles:
-//   finite   no number in force or state is not one
-//   limits   the force is within the device's limit, and its step within the slew
-//   energy   the hand gets back what it stored, and no more than holding a force for a tick costs beside it
-//   passive  with the controller on, the hand gets no more than it gave, and one tick's worst case
-//   outside  the tool is in nothing rigid, nor nearer than its radius
-//   held     what the tool is pulled through by a metre in a tick, it does not go through
-//   settled  when the tool has left: no force, and everything soft back where it was
-//   same     the forces are those of the same scene without the flaw, or where it is not far away
+//   finite   all numbers in force and state are finite
+//   limits   the force is within the device's limit, and its change within the slew limit
+//   energy   the hand gets back at most the stored energy and the cost of holding a force for a tick
+//   passive  with the controller on, the hand gets at most what it gave and one tick's worst case
+//   outside  the tool is in no rigid object, and no nearer to one than its radius
+//   held     pulled a metre through an object within a tick, the tool stays on its side
+//   settled  after the tool has left, there is no force, and all tissue is back at rest
+//   same     the forces are those of the scene without the flaw, or near the origin
 //   hash     a second run gives the same bits
 //   time     no tick takes long
-//   refused  file, line and column, what is wrong and what to do
-// TickInvariants says exactly what is meant by the first four.
+//   refused  the message has file, line, column, the error and the remedy
+// TickInvariants defines finite, limits, energy and outside exactly.
 //
-// A coupling stiffer than the sampled loop can hold buzzes: that is physics, and no row falls short for it.
-// What must hold then is that the buzz is fed by the sampling alone (energy), stays within the device's
-// limit, and ends when the tool leaves.
+// A coupling that is too stiff for the sampled loop buzzes. That is physics, and no row falls short for it.
+// But only the sampling may feed the buzz (energy), it must stay within the device's limit, and it must end
+// when the tool leaves.
 
 struct ExtremesOptions {
-  bool quick = false;  // a share of the table, in a few seconds
-  std::filesystem::path
-      scene{};  // also this one, as it is written, with every motion of a hand; may be empty
+  bool quick = false;             // a share of the cases, in a few seconds
+  std::filesystem::path scene{};  // also run this scene, unchanged, with every motion of a hand; may be empty
   Progress progress{};
-  std::function<void(const ExtremeRow&)> on_row{};  // as soon as there is one
+  std::function<void(const ExtremeRow&)> on_row{};  // called for each row as soon as it is there
 };
 
-// Throws std::runtime_error: the folder for temporary files cannot be written.
+// Throws std::runtime_error if the folder for temporary files cannot be written.
 std::vector<ExtremeRow> run_extremes(const ExtremesOptions& options);
 
 nlohmann::ordered_json to_json(const ExtremeRow& row);
-// For people: a line for each case and setting, with what fell short in words; and a count of each oracle.
+// Text for people: a line for each row that fell short, and counts for each oracle.
 std::string extremes_text(const std::vector<ExtremeRow>& rows);
 
 }  // namespace hybrid

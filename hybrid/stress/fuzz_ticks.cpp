@@ -128,9 +128,9 @@ to = [0, 0, 50]
 
 struct FuzzScene {
   std::string name;
-  std::string text;  // empty: of `kind`
+  std::string text;  // empty: the scene of `kind`
   SceneKind kind = SceneKind::rigid;
-  bool still = true;  // nothing moves, rubs or damps: the account of energy is defined
+  bool still = true;  // nothing moves, rubs or damps, so the account of energy is defined
 };
 
 const std::vector<FuzzScene>& scenes() {
@@ -142,12 +142,12 @@ const std::vector<FuzzScene>& scenes() {
   return kScenes;
 }
 
-// What comes from a device that may say anything.
+// Random input of a device that may give anything.
 class Input {
  public:
   explicit Input(std::uint64_t seed) : random_(seed) {}
 
-  // Half of the episodes are of places alone, so that nothing hides behind what is held back.
+  // Half of the episodes have only finite positions, so that inputs that are held back cannot hide an error.
   void begin_episode() {
     wild_ = chance(0.5);
     place_m_ = around(40.0 * kUnit_m);
@@ -188,7 +188,7 @@ class Input {
 
  private:
   double uniform(double low, double high) {
-    // std::uniform_real_distribution may give other numbers for the same bits on other standard libraries.
+    // std::uniform_real_distribution may differ between standard libraries for the same bits.
     return low + (high - low) * (static_cast<double>(random_() >> 11) * 0x1.0p-53);
   }
   bool chance(double p) { return uniform(0.0, 1.0) < p; }
@@ -264,7 +264,7 @@ class Fuzz {
     if (watch_->over_slew_N() > 0.0) fail(fmt::format("{:.3g} N over the slew", watch_->over_slew_N()));
     if (watch_->slowest_us() > kLongFuzzTick_us)
       fail(fmt::format("a tick of {:.3g} ms", 1e-3 * watch_->slowest_us()));
-    const bool infeasible = (state_.faults & fault_infeasible) != 0;  // between bodies that close on it
+    const bool infeasible = (state_.faults & fault_infeasible) != 0;  // bodies close on the tool
     if (watch_->inside_m() > kMostInside_m && !infeasible)
       fail(fmt::format("{:.3g} um inside something rigid", 1e6 * watch_->inside_m()));
     if (which_.still && watch_->excess_J() > watch_->tolerance_J())
@@ -300,7 +300,7 @@ class Fuzz {
     const bool rests = felt.force_N == glm::dvec3(0.0) && all_asleep(state_) && moved <= 0.02 * kUnit_m;
     if (rests) {
       ++result_.recoveries;
-    } else if (which_.still) {  // a body that moves may hold or meet the tool wherever it was led
+    } else if (which_.still) {  // a moving body may hold or meet the tool wherever the tool was led
       fail(fmt::format(
           "not at rest long after the tool left: {:.3g} N, {:.3g} um of displacement{}; the proxy "
           "is at ({:.3g}, {:.3g}, {:.3g}) mm, the device at ({:.3g}, {:.3g}, {:.3g})",

@@ -13,7 +13,7 @@ namespace hybrid {
 namespace {
 
 constexpr int kLargeEdge = 512;
-constexpr double kNearlyNothing = 1e-7;  // of an edge: a sliver's height
+constexpr double kNearlyNothing = 1e-7;  // height of a sliver, as a share of its edge
 
 glm::dvec3 block_size(BlockShape shape) {
   switch (shape) {
@@ -29,7 +29,7 @@ glm::dvec3 block_size(BlockShape shape) {
   return glm::dvec3(0.0);
 }
 
-// Its top is at 10. A block of one voxel lies where the tool presses, and beside the ball.
+// Centre of the block. Its top is at z = 10. A block of one voxel is where the tool presses, beside the ball.
 glm::dvec3 block_middle(BlockShape shape) {
   const double z = 10.0 - 0.5 * block_size(shape).z;
   return shape == BlockShape::voxel ? glm::dvec3(13.0, 2.0, z) : glm::dvec3(0.0, 0.0, z);
@@ -40,7 +40,7 @@ polygon::TriangleMesh with_slivers(const polygon::TriangleMesh& mesh) {
   for (const polygon::TriangleIndices& t : mesh.triangles) {
     const glm::dvec3 a = mesh.vertices[t[0]], b = mesh.vertices[t[1]], c = mesh.vertices[t[2]];
     const auto p = static_cast<std::uint32_t>(out.vertices.size());
-    out.vertices.push_back(a + 0.5 * (b - a) + kNearlyNothing * (c - a));  // hardly off the edge a–b
+    out.vertices.push_back(a + 0.5 * (b - a) + kNearlyNothing * (c - a));  // close to the edge a–b
     out.triangles.push_back({t[0], t[1], p});
     out.triangles.push_back({t[1], t[2], p});
     out.triangles.push_back({t[2], t[0], p});
@@ -67,7 +67,7 @@ polygon::TriangleMesh with_duplicates(const polygon::TriangleMesh& mesh) {
     const auto first = static_cast<std::uint32_t>(out.vertices.size());
     for (const std::uint32_t v : t) out.vertices.push_back(mesh.vertices[v]);
     out.triangles.push_back({first, first + 1, first + 2});
-    out.vertices.push_back(mesh.vertices[t[0]]);  // and one that nothing uses
+    out.vertices.push_back(mesh.vertices[t[0]]);  // a vertex that no triangle uses
   }
   return out;
 }
@@ -96,7 +96,7 @@ polygon::TriangleMesh flawed(const polygon::TriangleMesh& mesh, MeshFlaw flaw, i
   return mesh;
 }
 
-// Three numbers in meters, from units about the middle.
+// Three numbers in meters, from coordinates in units about the middle.
 std::string at(const SceneSetting& s, const glm::dvec3& units) {
   const glm::dvec3 p = s.origin_m + s.unit_m * units;
   return fmt::format("{:.17g}, {:.17g}, {:.17g}", p.x, p.y, p.z);
@@ -146,7 +146,7 @@ std::string scene_text(const SceneSetting& s) {
   if (s.kind != SceneKind::soft)
     text += fmt::format("[[rigid]]\nname = \"ball\"\nmesh = \"ball.ply\"\nposition = [{}]\n",
                         at(s, 0.0, 0.0, 14.0));
-  // The ball from above, down its side, into the corner, the block alone, and away.
+  // The path: the ball from above, down its side, into the corner, the block alone, and away.
   text += fmt::format(
       "[path]\nkind = \"waypoints\"\nspeed = {:.17g}\npoints = [[{}], [{}, 0.05], [{}], [{}, 0.1], [{}], "
       "[{}, 0.3]]\n",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A folder for files that nobody keeps. It goes when the object does.
+// A temporary folder. It is deleted together with the object.
 #pragma once
 
 #include <fmt/format.h>

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kFormat = 1;  // of a record: another one is not found
+constexpr int kFormat = 1;  // of a record; records of another format are not found
 constexpr std::uint64_t kFnvBegin = 0xCBF29CE484222325ULL, kFnvPrime = 0x100000001B3ULL;
 
 std::uint64_t fnv(std::string_view bytes, std::uint64_t hash = kFnvBegin) {
@@ -49,7 +49,8 @@ std::uint64_t hash_of(const fs::path& path) {
   return hash;
 }
 
-// The program by its own bytes: two builds of one version may give other forces.
+// Identifies program and machine. The program counts by the hash of its file, because two builds of one
+// version may give different forces.
 std::string program_text() {
   const nlohmann::ordered_json head = report_head("tune");
   return fmt::format("{} {} {:016x}", head.at("version").get<std::string>(),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finished evaluations on disk, so that a search that was ended goes on where it was. A record is found by
-// all that its result depends on: the scene, the files that it reads, the program, the machine, and a text.
+// Finished evaluations on disk, so that a search that was stopped can continue. A record is found by all that
+// its result depends on: the scene, the files that the scene reads, the program, the machine, and a text.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,13 @@ namespace hybrid {
 
 class EvaluationCache {
  public:
-  // An empty folder keeps nothing. It is made where it is missing. Throws std::runtime_error: it cannot be
-  // written, or a file of the scene cannot be read.
+  // An empty path: nothing is kept. Makes the folder if it is missing. Throws std::runtime_error: the folder
+  // cannot be written, or a file of the scene cannot be read.
   EvaluationCache(std::filesystem::path folder, const Scene& scene);
 
   // The record of this text; empty if there is none, or if its file is damaged.
   [[nodiscard]] std::optional<nlohmann::json> find(const std::string& text) const;
-  // Writes the record whole or not at all.
+  // Writes the whole record or nothing.
   void keep(const std::string& text, const nlohmann::json& record) const;
 
  private:
@@ -32,7 +32,7 @@ class EvaluationCache {
   std::string depends_on_;
 };
 
-// Files and folders that the scene reads, besides itself.
+// The files and folders that the scene reads, without the scene's own file.
 std::vector<std::filesystem::path> scene_files(const Scene& scene);
 
 }  // namespace hybrid

@@ -15,7 +15,7 @@ struct Wanted {
   std::string key, value;
 };
 
-// A change of the text: `remove` bytes from `at` on become `add`.
+// A change of the text: `remove` bytes from `at` on are replaced by `add`.
 struct TextEdit {
   std::size_t at = 0, remove = 0;
   std::string add;
@@ -26,7 +26,7 @@ std::size_t line_begin(std::string_view text, std::size_t at) {
   return before == std::string_view::npos ? 0 : before + 1;
 }
 
-// Behind a string, whose quotes are kept in it: one of four kinds.
+// Position behind a string that begins at `at`, including its closing quotes. TOML has four kinds of strings.
 std::size_t string_end(std::string_view text, std::size_t at) {
   const char quote = text[at];
   const std::string three(3, quote);
@@ -44,7 +44,7 @@ std::size_t string_end(std::string_view text, std::size_t at) {
   return text.size();
 }
 
-// Behind a value: a string, an array (which may hold comments), or a plain word or number.
+// Position behind a value: a string, an array (which may hold comments), or a plain word or number.
 std::size_t value_end(std::string_view text, std::size_t at) {
   if (text[at] == '"' || text[at] == '\'') return string_end(text, at);
   if (text[at] != '[') return std::min(text.find_first_of(" \t\r\n,}]#", at), text.size());
@@ -75,7 +75,7 @@ const TreeNode& table_of(const TreeNode& root, const std::string& object) {
   throw std::runtime_error(fmt::format("no [[soft]] table has name = \"{}\"; give it one", object));
 }
 
-// Keys whose value is another one than the file's.
+// The keys whose value differs from that in the file.
 std::vector<Wanted> wanted_of(const TunableObject& object, const ObjectSetting& setting) {
   std::vector<Wanted> wanted;
   if (setting.proxy != object.own.proxy)
@@ -103,7 +103,7 @@ class Editor {
     give_reason(line_begin(text_, first), reason);
   }
 
-  // Reasons of an earlier choice are taken out, as this one replaces it.
+  // Returns the edited text. The reasons of an earlier choice are removed, because the new ones replace them.
   std::string result() {
     if (edits_.empty()) return std::string(text_);
     for (std::size_t line = 0; line < text_.size();) {
@@ -130,7 +130,7 @@ class Editor {
     return at;
   }
 
-  // Below the line of the object's name; in an inline table behind the name.
+  // Adds a key below the line of the object's name; in an inline table, behind the name.
   std::size_t add(const TreeNode& table, const Wanted& wanted) {
     const TreeEntry& name = *entry_of(table, "name");
     const std::size_t at = byte_at(text_, name.value.place), end = value_end(text_, at);
@@ -161,7 +161,7 @@ class Editor {
   std::string_view text_;
   const TreeNode& root_;
   std::vector<TextEdit> edits_;
-  std::vector<std::size_t> reasons_;  // lines that have theirs
+  std::vector<std::size_t> reasons_;  // beginnings of the lines that have a reason
 };
 
 bool same(const TreeNode& a, const TreeNode& b) {
@@ -178,7 +178,7 @@ bool same(const TreeNode& a, const TreeNode& b) {
   });
 }
 
-// Takes the keys out of the object's table, and returns their values.
+// Removes the keys from the object's table and returns their values.
 std::vector<TreeNode> take(TreeNode& root, const std::string& object, const std::vector<Wanted>& wanted) {
   std::vector<TreeNode> values;
   auto& entries = const_cast<TreeNode&>(table_of(root, object)).entries;

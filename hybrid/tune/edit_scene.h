@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes a setting into the text of a scene. Only the values' own characters change, and keys that are
-// missing are added; comments, order and layout stay.
+// Writes a setting into the text of a scene. Only values change, and missing keys are added. Comments, order
+// and layout stay.
 #pragma once
 
 #include <filesystem>
@@ -12,14 +12,14 @@
 
 namespace hybrid {
 
-// The line that gives the reason begins with this. One that stands there already is replaced.
+// A line with the reason begins with this mark. Lines that already begin with it are replaced.
 inline constexpr std::string_view kReasonMark = "# hybrid tune: ";
 
-// The text of a scene file with the setting in it, and `reason`, one sentence, in a comment above each object
-// that changed. Values that are as the scene has them are left as they are written. The result has been
-// parsed again: it has the setting's values, and all others are as they were. `file` is named in messages
-// only. Throws SceneError: the text is no scene. Throws std::runtime_error: it cannot be edited, with what to
-// write.
+// Returns the text of a scene file with the setting in it. A comment above each object that changed gives
+// `reason`, which is one sentence. Values that do not differ from the scene's keep their text. The result has
+// been parsed again: it has the values of the setting, and all other values are as before. `file` is used
+// only in messages. Throws SceneError: the text is no scene. Throws std::runtime_error with the lines to
+// write by hand: the text cannot be edited.
 std::string edited_scene(std::string_view text, const std::filesystem::path& file,
                          const std::vector<TunableObject>& objects, const Setting& setting,
                          const std::string& reason);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The difference between two sessions along one motion, in JND, over the ticks in which something soft is
-// felt in either.
+// The difference between two sessions along one motion, in JND. Only ticks count in which at least one of the
+// two sessions feels something soft.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ struct SettingError {
   }
 };
 
-// `ticks`: only the first so many count. 1 JND is of the reference's force.
+// `ticks`: only so many ticks from the start count. The JND is that of the reference's force.
 SettingError felt_error(const ForceCourse& course, const ForceCourse& reference, double floor_N, double dt_s,
                         std::size_t ticks = static_cast<std::size_t>(-1));
 

@@ -17,7 +17,7 @@ bool equal(const CostAndError& a, const CostAndError& b) {
   return a.cost_us == b.cost_us && a.error_jnd == b.error_jnd;
 }
 
-// The best of the points that pass, by `less`; empty if none does.
+// Index of the best point, by `less`, of those that `pass` accepts; empty if it accepts none.
 template <typename Pass, typename Less>
 std::optional<std::size_t> best(std::span<const CostAndError> points, const Pass& pass, const Less& less) {
   std::optional<std::size_t> found;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cost against error: what is dominated, and the rules by which a setting is chosen.
+// Cost against error: dominated settings, the Pareto front, and the rules by which a setting is chosen.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,20 @@
 
 namespace hybrid {
 
-// A setting as the choice sees it.
+// The data of a setting that the choice depends on.
 struct CostAndError {
-  double cost_us = 0.0;    // tick p99.9
-  double error_jnd = 0.0;  // the larger of moving and still
-  bool sound = true;       // its session was without a fault
+  double cost_us = 0.0;    // time of a tick, a percentile that the caller chooses
+  double error_jnd = 0.0;  // the larger of the errors while moving and while still
+  bool sound = true;       // false: its session had a fault
 };
 
-// Index of a point that is at least (1 + margin) times better in both, and better in one of them; empty if
-// there is none. Of equal points the first one stays.
+// Index of a point that dominates `point`: it is at least (1 + margin) times better in both cost and error,
+// and strictly better in one of them. Empty if there is none. Without a margin, the first of equal points
+// dominates the others.
 std::optional<std::size_t> dominated_by(std::span<const CostAndError> points, std::size_t point,
                                         double margin = 0.0);
 
-// Points that no other one dominates, by rising cost.
+// The points that no other point dominates, by rising cost.
 std::vector<std::size_t> pareto_front(std::span<const CostAndError> points);
 
 struct Bounds {
@@ -30,21 +31,22 @@ struct Bounds {
   double budget_us = 500.0;
 };
 
-// Which rule decided.
+// The rule that decided.
 enum class ChoiceRule : unsigned char {
-  cheapest_accurate,      // under the error's bound, within the budget: the cheapest
-  most_accurate_in_time,  // none of these: the most accurate one within the budget
-  cheapest,               // nothing is within the budget: the cheapest
+  cheapest_accurate,      // the cheapest of those under the error's bound and within the budget
+  most_accurate_in_time,  // there are none such: the most accurate within the budget
+  cheapest,               // none is within the budget: the cheapest of all
 };
 
 struct Choice {
   std::size_t chosen = 0;
   ChoiceRule rule = ChoiceRule::cheapest_accurate;
-  bool any_sound = true;                     // false: every session had a fault, so faults did not count
-  std::optional<std::size_t> next_accurate;  // the next cheapest under the error's bound
+  bool any_sound = true;                     // false: every session had a fault, so faults were ignored
+  std::optional<std::size_t> next_accurate;  // the next cheapest setting under the error's bound
 };
 
-// Faulty settings are chosen only if all are. Throws std::invalid_argument: no points.
+// Chooses by the first rule that applies. Settings with a fault are chosen only if all have one. Throws
+// std::invalid_argument if there are no points.
 Choice choose_setting(std::span<const CostAndError> points, const Bounds& bounds);
 
 }  // namespace hybrid

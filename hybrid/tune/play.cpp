@@ -12,10 +12,11 @@
 namespace hybrid {
 namespace {
 
-constexpr double kAfterMotion_s = 0.5;       // as a session has it: tissue comes to rest
-constexpr std::size_t kLastContactBit = 31;  // of TraceRow::contacts, shared by all further objects
+constexpr double kAfterMotion_s = 0.5;  // a session goes on after its path, so that tissue comes to rest
+// Bit of TraceRow::contacts that all objects from this index on share.
+constexpr std::size_t kLastContactBit = 31;
 
-// The contact bits of the objects, in a world in which some are soft and some are rigid.
+// The contact bits of the named objects. In a given world some of them are soft and others rigid.
 std::uint32_t contact_bits(const World& world, const std::vector<std::string>& objects) {
   std::uint32_t bits = 0;
   for (std::size_t o = 0; o < world.object_count(); ++o) {

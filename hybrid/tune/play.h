@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Plays a scene with one setting along a motion: forces, times of ticks, size. Plays it slowly for the truth.
+// Plays a scene with one setting along a motion, at normal speed (forces, times of ticks, size) or slowly
+// (forces for the truth).
 #pragma once
 
 #include <cstdint>
@@ -13,32 +14,32 @@ namespace hybrid {
 
 struct Motion {
   std::shared_ptr<const device::Path> path;
-  std::uint64_t ticks = 0;  // of a session
+  std::uint64_t ticks = 0;  // length of a session
 };
 
-// The scene's own path, and the half second after it that a session has.
+// The scene's own path, and half a second after it, as in a session.
 Motion scene_motion(const Scene& scene);
 
 struct Played {
-  ForceCourse course;           // the force of the coupling: what damping and texture add is the same in all
+  ForceCourse course;           // forces of the coupling; damping and texture would add the same to all
   std::vector<double> tick_us;  // processor time of each tick
   std::uint64_t memory_bytes = 0, soft_voxels = 0;
   double load_s = 0.0;
   std::vector<std::string> faults;
 };
 
-// A session on an ideal device (on_ideal_device()), at a fixed step. `objects`: names of the objects whose
-// contact counts as soft, also where they are felt through the proxy. Throws SceneError, std::exception; and
-// device::StopAsked when a signal came.
+// Plays a session on an ideal device (on_ideal_device()) at a fixed step. `objects`: names of the objects
+// whose contact counts as soft, even if they are rendered by the proxy. Throws SceneError, std::exception,
+// and device::StopAsked after a signal.
 Played play_setting(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
                     const Progress& progress);
 
-// The same session played so many times slower wherever one of the objects is felt (compare_with_slow_run());
-// elsewhere as it is.
+// Plays the same session `slower` times slower wherever one of the objects is felt (compare_with_slow_run()),
+// and at normal speed elsewhere.
 ForceCourse play_slowly(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
                         int slower, const Progress& progress);
 
-// The motion 1.5 times faster and moved by `offset_m`: one on which nothing was chosen.
+// The motion played 1.5 times faster and moved by `offset_m`. No setting was chosen on it.
 Motion other_motion(const Motion& motion, double rate_hz, const glm::dvec3& offset_m);
 inline constexpr double kOtherSpeed = 1.5;
 

@@ -8,7 +8,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFromCache_s = 0.02;  // a step that took less did no session
+constexpr double kFromCache_s = 0.02;  // a shorter step came from the cache
 
 std::string time_in_words(double seconds) {
   return seconds < 90.0 ? fmt::format("{:.0f} s", seconds) : fmt::format("{:.0f} min", seconds / 60.0);

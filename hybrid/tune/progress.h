@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Progress of a search as a share and a time left, from weights of its steps.
+// Progress of a search: the done share and the time left, from the weights of its steps.
 #pragma once
 
 #include <chrono>
@@ -14,9 +14,9 @@ class SearchProgress {
  public:
   explicit SearchProgress(Progress say) : say_(std::move(say)) {}
 
-  // More, or less, is to be done than was planned.
+  // Changes the planned work by this weight; negative: less work.
   void plan(double weight) { planned_ += weight; }
-  // Does the work and says its progress.
+  // Does the work of a step and reports its progress.
   void step(const std::string& words, double weight, const std::function<void(const Progress&)>& work);
   [[nodiscard]] Step as_step() {
     return [this](const std::string& words, double weight, const std::function<void(const Progress&)>& work) {
@@ -32,7 +32,7 @@ class SearchProgress {
   Progress say_;
   Clock::time_point begin_ = Clock::now();
   double planned_ = 0.0, done_ = 0.0;
-  double worked_ = 0.0, worked_s_ = 0.0;  // weight and time of steps that were not from a cache
+  double worked_ = 0.0, worked_s_ = 0.0;  // weight and time of the steps that did not come from the cache
 };
 
 }  // namespace hybrid

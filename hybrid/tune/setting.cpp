@@ -16,7 +16,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFewestVoxels = 2.0;  // along an edge of a formula: one layer is held, one can move
+// Along an edge of a formula, so that one layer can be held and one can move.
+constexpr double kFewestVoxels = 2.0;
 
 double rounded(double value) {
   return std::strtod(with_digits(value, kSpacingDigits).c_str(), nullptr);
@@ -42,7 +43,7 @@ bool yields(const Scene& scene, const SoftDescription& soft) {
                              [](const Material* m) { return std::isfinite(m->yield); });
 }
 
-// Voxels of a file without resampling, in the scene's unit.
+// The voxels' spacing in a file before resampling, in the scene's unit.
 glm::dvec3 file_spacing(const Scene& scene, const SoftDescription& soft) {
   SoftDescription plain = soft;
   auto& volume = std::get<VolumeSource>(plain.source);

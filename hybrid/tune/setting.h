@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A setting: values of a scene's soft objects that cost and accuracy depend on. Pure data, so that it can be
-// compared, stored, put into a scene in memory, and written into the scene's file.
+// A setting: the values of a scene's soft objects on which cost and accuracy depend. It is pure data. So it
+// can be compared, stored, put into a scene in memory, and written into the scene's file.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -14,9 +14,9 @@ namespace hybrid {
 // Values of one soft object, as its table in the scene file has them.
 struct ObjectSetting {
   std::string object;
-  bool proxy = false;  // model: felt as if it were rigid; the other values then have no effect
-  // In the file's length unit, at most kSpacingDigits digits, so that the text is the exact value. All 0: the
-  // file has none and gets none.
+  bool proxy = false;  // model: rendered as if rigid; then the other values have no effect
+  // In the file's length unit, with at most kSpacingDigits digits, so that the text is the exact value. All
+  // 0: the file gives no spacing, and none is written.
   glm::dvec3 spacing{0.0};
   Energy energy = Energy::six_link;
 
@@ -33,42 +33,43 @@ struct Setting {
 
 inline constexpr int kSpacingDigits = 7;
 
-// A soft object that may be tuned, and what its table has now.
+// A soft object that may be tuned, and the values that its table has now.
 struct TunableObject {
   ObjectSetting own;
-  glm::dvec3 finest{0.0};   // of its source, in the file's unit: finer voxels hold no more; 0: no bound
-  glm::dvec3 snap_to{0.0};  // edges of a formula, in the file's unit, which its voxels have to fill; 0: none
-  bool other_energy = false;   // the key has an effect, and both values are allowed
-  bool other_model = false;    // it may be felt through the proxy too
-  bool model_written = false;  // the table has the key with a value other than voxels
-  std::string note;            // why a value stays as it is, in words; may be empty
+  glm::dvec3 finest{0.0};   // spacing of its source in the file's unit: finer voxels add nothing; 0: no bound
+  glm::dvec3 snap_to{0.0};  // edges of a formula, in the file's unit, that its voxels must fill; 0: none
+  bool other_energy = false;   // the key `energy` has an effect, and both its values are allowed
+  bool other_model = false;    // the object may also be rendered by the proxy
+  bool model_written = false;  // the table has the key `model` with a value other than voxels
+  std::string note;            // why a value cannot be changed, in words; may be empty
 };
 
-// The soft objects of a scene as read_scene() has it (models as written). Objects that the scene says are
-// felt through the proxy are left out. Opens volumes whose spacing the scene does not say. Throws SceneError,
+// The soft objects of a scene from read_scene(), with models as written. Objects for which the scene asks for
+// the proxy are left out. Opens volumes whose spacing the scene does not give. Throws SceneError,
 // std::exception.
 std::vector<TunableObject> tunable_objects(const Scene& as_read);
 
 Setting own_setting(const std::vector<TunableObject>& objects);
 
-// The object with its voxels `scale` times as wide, but no finer than its source. A formula's edges stay
-// whole numbers of voxels, so that its surfaces stay in place. Scale 1 is the object's own spacing.
+// The setting of the object with voxels `scale` times as wide, but no finer than its source. A formula's
+// edges stay whole numbers of voxels, so that its surfaces stay in place. Scale 1 is the object's own
+// spacing.
 ObjectSetting scaled(const TunableObject& object, double scale);
-// How much coarser than the object's own the setting is: geometric mean over the axes; 1 without a spacing.
+// Spacing of the setting over the object's own: geometric mean over the axes; 1 without a spacing.
 double scale_of(const TunableObject& object, const ObjectSetting& setting);
 
-// The scene of read_scene() with these values, models decided, on an ideal device.
+// The scene from read_scene() with these values, on an ideal device. All models are decided.
 Scene with_setting(const Scene& as_read, const Setting& setting);
 
-// The scene as accurate as it can be at this setting's spacing: voxels everywhere, trilinear energy where the
-// materials allow it, no thinning.
+// The most accurate scene at this setting's spacing: voxels everywhere, no thinning, and trilinear energy
+// where the materials allow it.
 Scene as_reference(const Scene& as_read, const Setting& setting);
 
-// "2.5 mm six-link"; of several objects with unlike values "block 2.5 mm six-link, bone proxy".
+// For example "2.5 mm six-link". If several objects differ: "block 2.5 mm six-link, bone proxy".
 std::string in_words(const Setting& setting, double unit_m);
 // The lines of each object's table, as in a scene file.
 std::string as_toml(const Setting& setting);
-// A spacing as the value of its key: one number, or a list of three.
+// A spacing as the text of its key's value: one number, or a list of three.
 std::string spacing_text(const glm::dvec3& spacing);
 const char* energy_name(Energy energy);
 

@@ -12,14 +12,16 @@ namespace hybrid {
 namespace {
 
 // Orders of the errors. Spacing: a voxel surface lies within half a spacing of the true one, and the edge of
-// a contact is known to a spacing: both are of first order, whatever the energy.
+// a contact is known to one spacing. Both errors are of first order, for either energy.
 constexpr double kSpacingOrder = 1.0;
-// Slowness: tissue comes to rest as diffusion does, so the lag falls with the root of the time. In a press of
-// fine trilinear voxels, 10, 20, 40 and 80 times slower, it was 0.070, 0.048, 0.037 and 0.021 N.
+// Slowness: tissue comes to rest by diffusion, so the lag falls with the root of the time. In a press on
+// fine trilinear voxels it was 0.070, 0.048, 0.037 and 0.021 N when played 10, 20, 40 and 80 times slower.
 constexpr double kRestOrder = 0.5;
-constexpr double kCoarser = 2.0;    // a smaller ratio of spacings would amplify the noise of the grid's place
-constexpr double kSlowPlays = 0.4;  // share of a path with contact, for the weight of a slow run
-constexpr double kWeightPower = 1.5;  // of 1/scale: voxels near the contact cost, not all of them
+// Ratio of spacings. A smaller ratio would amplify the noise that the grid's position causes.
+constexpr double kCoarser = 2.0;
+constexpr double kSlowPlays = 0.4;  // assumed share of a path in contact, for the weight of a slow run
+// Exponent of 1/scale; less than 3, because mainly the voxels near the contact cost time.
+constexpr double kWeightPower = 1.5;
 
 nlohmann::json course_json(const ForceCourse& course) {
   nlohmann::json j = nlohmann::json::array();
@@ -46,7 +48,7 @@ FeltError times(FeltError error, double factor) {
   return error;
 }
 
-// The error of the better of two runs, from their difference: their errors are as 1 to ratio^order.
+// The error of the better of two runs, from their difference. The errors have the ratio 1 : ratio^order.
 SettingError richardson(const SettingError& difference, double ratio, double order) {
   const double factor = 1.0 / (std::pow(ratio, order) - 1.0);
   return {times(difference.moving, factor), times(difference.still, factor)};
@@ -65,7 +67,7 @@ Setting coarser(const std::vector<TunableObject>& objects, const Setting& settin
   return coarse;
 }
 
-// Geometric mean over the objects of how much coarser one setting is than the other.
+// The spacing of one setting over that of the other: geometric mean over the objects.
 double ratio_of(const std::vector<TunableObject>& objects, const Setting& coarse, const Setting& fine) {
   double sum = 0.0;
   for (std::size_t n = 0; n < objects.size(); ++n) {

@@ -16,16 +16,18 @@
 namespace hybrid {
 namespace {
 
-constexpr double kBudgetShare = 0.5;       // of the device's period
-constexpr double kFirstShare = 1.0 / 3.0;  // of the contact, in the first round
-// A setting is left out if another is this much better in both: after a part of the motion, and after all.
+constexpr double kBudgetShare = 0.5;       // default budget, as a share of the device's period
+constexpr double kFirstShare = 1.0 / 3.0;  // share of the contact that the first round plays
+// A setting is left out if another is better in cost and error by this margin: after the first round, and
+// after the second.
 constexpr double kMarginOfPart = 0.3, kMarginOfWhole = 0.1;
-constexpr std::size_t kPasses = 5, kQuickPasses = 3;  // timed sessions of each setting; odd, for the median
+// Timed sessions of each setting; odd, so that a median is one of them.
+constexpr std::size_t kPasses = 5, kQuickPasses = 3;
 constexpr double kMostTruthVoxels = 4e6;
-constexpr double kOtherWay = 0.5;        // spacings, by which the confirming motion lies beside
-constexpr double kStaysInContact = 0.5;  // least share of the contact that the confirming motion keeps
+constexpr double kOtherWay = 0.5;        // spacings by which the confirming motion is moved sideways
+constexpr double kStaysInContact = 0.5;  // share of the contact that the confirming motion must keep
 
-// A setting while it is tried: the ticks of its passes.
+// A setting under test, with the times of its ticks in each pass.
 struct Trial {
   TunedSetting tuned;
   std::vector<std::vector<double>> passes;
@@ -84,14 +86,14 @@ class Search {
 
   void plan(const std::vector<Setting>& settings) {
     const double scale = truth_scale();
-    // The truth, that of the confirming motion, and the two runs for its error.
+    // Runs for the truth, for the truth of the confirming motion, and two for the truth's error.
     progress_.plan((1.0 + 1.0 / kOtherSpeed) * slow_weight(scale, kTruthSlower) +
                    slow_weight(scale, kTruthSlower / 2) + slow_weight(2.0 * scale, kTruthSlower));
     for (const Setting& setting : settings)
       progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
   }
 
-  // Wider voxels where the truth would have too many of them.
+  // Scale of the truth's spacing. It is greater than kTruthScale if there would be too many voxels.
   double truth_scale() {
     if (truth_scale_ > 0.0) return truth_scale_;
     const BuiltScene built = build_scene(as_reference(as_read_, own_setting(result_.objects)));
@@ -135,7 +137,7 @@ class Search {
             .dt_s = dt_s()};
   }
 
-  // One session, from the cache or played.
+  // One session with a setting: from the cache if it is there, otherwise played.
   Evaluation evaluate(const Setting& setting, const Motion& motion, const std::string& motion_words,
                       const ForceCourse& truth, std::size_t pass) {
     const std::string key = fmt::format("play pass {} {} {}\ntruth {}\n{}", pass, motion.ticks, motion_words,
@@ -159,7 +161,8 @@ class Search {
     return evaluation;
   }
 
-  // Two rounds: a part of the motion for all, the whole one for those that nothing clearly dominates.
+  // Two rounds. The first plays a part of the motion with all settings. The second plays the whole motion
+  // with those that no other setting clearly dominates.
   void try_settings(const std::vector<Setting>& settings) {
     const std::size_t first = trials_.size();
     for (const Setting& setting : settings) {
@@ -195,7 +198,7 @@ class Search {
     tuned.tick_us = percentiles(ticks);
   }
 
-  // Leaves out what is clearly dominated, of those from `first` on; the scene's own setting never is.
+  // Leaves out settings from `first` on that are clearly dominated, but never the scene's own setting.
   void leave_out(std::size_t first, double margin, const std::string& when) {
     std::vector<std::size_t> whole;
     std::vector<CostAndError> points;
@@ -216,7 +219,7 @@ class Search {
     }
   }
 
-  // Of several objects each by itself, from the common setting that the rules would choose now.
+  // With several objects: varies each of them by itself, from the common setting that would be chosen now.
   void refine() {
     const std::vector<std::size_t> whole = whole_trials();
     const Choice choice = choose_setting(points_of(whole, false), result_.bounds);
@@ -250,8 +253,8 @@ class Search {
     return points;
   }
 
-  // Further passes, each in the reverse order of the one before, so that a machine that gets slower or faster
-  // does not favour any setting.
+  // Plays further passes. Each has the reverse order of the one before, so that a machine that gets slower or
+  // faster favours no setting.
   void time_survivors() {
     std::vector<std::size_t> order = whole_trials();
     for (std::size_t pass = 1; pass < passes(); ++pass) {
@@ -283,7 +286,7 @@ class Search {
     for (Trial& trial : trials_) result_.settings.push_back(std::move(trial.tuned));
   }
 
-  // Sideways: along the axis of the scene in which the truth's mean force is least.
+  // Offset along the axis of the scene in which the truth's mean force is least.
   [[nodiscard]] glm::dvec3 sideways_m() const {
     glm::dvec3 force(0.0);
     for (const CourseTick& tick : result_.truth.course) {
@@ -306,7 +309,7 @@ class Search {
                         1e3 * offset_m.x, 1e3 * offset_m.y, 1e3 * offset_m.z);
         confirm_on(other_motion(motion_, as_read_.rate_hz, offset_m), words);
         return;
-      } catch (const SceneError& error) {  // there the tool begins in something
+      } catch (const SceneError& error) {  // the tool begins inside an object there
         result_.confirmation = {};
         result_.confirmation.not_done = error.what();
       }

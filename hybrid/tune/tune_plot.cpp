@@ -14,14 +14,14 @@
 namespace hybrid {
 namespace {
 
-// Of the page (pixels).
+// Of the page; all in pixels.
 constexpr double kWidth = 960.0, kHeight = 620.0;
 constexpr double kLeft = 76.0, kRight = 930.0, kTop = 70.0, kBottom = 560.0;
 constexpr double kSmallestMark = 4.0, kLargestMark = 14.0;  // radius
 constexpr double kLetterWidth = 6.0;
 constexpr int kTicks = 16;
-constexpr double kMargin = 1.5;       // of the axes, beyond the outermost values
-constexpr double kLeastShown = 0.01;  // JND: a smaller error is drawn here
+constexpr double kMargin = 1.5;       // factor by which the axes exceed the outermost values
+constexpr double kLeastShown = 0.01;  // JND; a smaller error is drawn at this value
 constexpr const char* kGrey = "#b5bac1";
 
 class TunePlot {
@@ -123,7 +123,7 @@ class TunePlot {
     if (drawn(chosen)) mark(chosen, fmt::format("stroke=\"{}\" stroke-width=\"2.5\"", series_colour(1)), 4.0);
   }
 
-  // Names that would lie on another name are left out; each mark has its name as a tooltip.
+  // Draws the names that do not overlap others. Each mark also has its name as a tooltip.
   void draw_names() {
     std::vector<std::size_t> order{result_.chosen};
     order.insert(order.end(), result_.front.begin(), result_.front.end());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Error over the tick's p99.9 of all settings, both logarithmic.
+// Plot of all settings: error over the p99.9 of the tick, both axes logarithmic.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,9 @@
 
 namespace hybrid {
 
-// The front is joined, the chosen setting is marked, dominated ones are grey; the area of a mark grows with
-// its memory. Lines show the error's bound and the budget. Throws std::runtime_error: not writable.
+// The settings of the front are joined by a line, the chosen one is marked, and dominated ones are grey. The
+// area of a mark grows with the memory. Lines show the error's bound and the budget. Throws
+// std::runtime_error if the file is not writable.
 void save_tune_plot(const std::filesystem::path& svg, const TuneResult& result, const std::string& title);
 
 }  // namespace hybrid

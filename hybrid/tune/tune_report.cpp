@@ -14,7 +14,7 @@
 namespace hybrid {
 namespace {
 
-// Share of the passes that has to agree.
+// Share of the passes that must agree before a comparison of costs is reported as certain.
 constexpr double kTold = 0.75;
 
 struct PassRange {
@@ -44,7 +44,7 @@ const char* rule_name(ChoiceRule rule) {
   return "";
 }
 
-// What else would make the tick fit.
+// A sentence about changes of the scene that would make the tick fit the budget.
 std::string remedy_in_time(const TuneResult& result) {
   const TunedSetting& chosen = result.settings[result.chosen];
   return fmt::format(
@@ -54,7 +54,7 @@ std::string remedy_in_time(const TuneResult& result) {
       "its tick", chosen.tick_us.p999 / result.bounds.budget_us, chosen.soft_voxels);
 }
 
-// Whether the truth's own error is too large to tell what lies under the error's bound.
+// Is the truth's own error too large to tell which settings are under the error's bound?
 bool truth_hides_bound(const TuneResult& result) {
   return result.truth.error_jnd() >= result.bounds.error_jnd;
 }
@@ -74,7 +74,7 @@ std::string doubt_about_error(const TuneResult& result) {
   return text;
 }
 
-// Ahead of a verdict that cannot be trusted.
+// Text before a verdict that cannot be trusted, because the truth is too uncertain; otherwise empty.
 std::string truth_warning(const TuneResult& result) {
   if (!truth_hides_bound(result)) return {};
   return fmt::format(
@@ -107,7 +107,7 @@ std::string marked_words(const TunedSetting& s) {
   return s.words + (s.own ? " (as it is)" : "");
 }
 
-// `mark`: one letter before a setting.
+// `mark`: gives the letter before a setting.
 Table<TunedSetting> setting_table(const std::function<char(const TunedSetting&)>& mark) {
   const auto p99 = [](const FeltError& e) { return e.ticks > 0 ? fmt::format("{:.2f}", e.p99_jnd) : "-"; };
   return Table<TunedSetting>({

@@ -11,15 +11,16 @@ namespace hybrid {
 
 // The choice and its reason in one sentence.
 std::string tune_verdict(const TuneResult& result);
-// The reason for the scene's file, one sentence without line breaks.
+// The reason as a comment for the scene's file: one sentence without line breaks.
 std::string tune_reason(const TuneResult& result);
-// The truth, the front, what was left out, and the confirmation; several lines.
+// The truth, the front, the settings that were left out, and the confirmation; several lines.
 std::string tune_words(const TuneResult& result);
 // Keys of `hybrid tune --json`, to be added to report_head().
 nlohmann::ordered_json tune_json(const TuneResult& result);
 
-// Whether the machine's noise hides which of two settings is cheaper: in more than a quarter of the passes,
-// which are played in turns, the order of their p99.9 is another one.
+// Does the machine's noise hide which of two settings is cheaper? It does if their p99.9 has one order in
+// more than a quarter of the passes and the other order in more than a quarter, too. The settings are played
+// in turns.
 bool cost_hidden(const TunedSetting& a, const TunedSetting& b);
 
 }  // namespace hybrid

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cases of `hybrid validate`. Each adds its rows, and its panels if it has any.
+// The cases of `hybrid validate`. Each function adds its rows, and its panels if it has any.
 #pragma once
 
 #include "hybrid/validate/validate.h"
@@ -13,7 +13,8 @@ void add_silicones(const ValidationOptions& options, ValidationReport& report);
 void add_probed_tissues(const ValidationOptions& options, ValidationReport& report);
 void add_cartilage(const ValidationOptions& options, ValidationReport& report);
 
-std::string silicone_quantity(std::size_t strain);  // of a row, by index into kSiliconeStrains
+// Quantity of a row; `strain` is an index into kSiliconeStrains.
+std::string silicone_quantity(std::size_t strain);
 void say(const ValidationOptions& options, const std::string& text);
 const char* words_of(Energy energy);  // "bricks", "links"
 

@@ -11,9 +11,9 @@ namespace {
 
 constexpr const char* kClosedFormGroup = "closed form";
 constexpr double kYoung_Pa = 10e3;
-constexpr double kShallow = 0.0025;  // depth of a ball, in its radii: Hertz holds for small ones
+constexpr double kShallow = 0.0025;  // depth of a ball in its radii; Hertz holds for small depths
 
-// Six links have no volume that they keep, so ν of bricks is the one that is tried.
+// Six links do not conserve volume, so ν is tested with bricks.
 void add_bar(Energy energy, double poisson, double spacing_m, ValidationReport& report) {
   PressedSpecimen bar({.shape = Specimen::Shape::cylinder,
                        .size_m = {kSiliconeDiameter_m, kSiliconeDiameter_m, kSiliconeHeight_m},
@@ -36,7 +36,7 @@ void add_bar(Energy energy, double poisson, double spacing_m, ValidationReport& 
        .stated = true});
 }
 
-// Half of a cylinder that is bonded at both ends: its middle plane stays flat, and slips.
+// Tests a cylinder that is bonded at both ends, by its lower half: the middle plane stays flat, and slips.
 void add_bonded_disc(double spacing_m, ValidationReport& report) {
   PressedSpecimen half({.shape = Specimen::Shape::cylinder,
                         .size_m = {kSiliconeDiameter_m, kSiliconeDiameter_m, 0.5 * kSiliconeHeight_m},
@@ -45,7 +45,8 @@ void add_bonded_disc(double spacing_m, ValidationReport& report) {
                         .poisson = 0.49,
                         .young_Pa = {kYoung_Pa}});
   constexpr double strain = 0.05;
-  const double shape = kSiliconeDiameter_m / (4.0 * kSiliconeHeight_m);  // loaded area / free area
+  // Shape factor: loaded area / free area.
+  const double shape = kSiliconeDiameter_m / (4.0 * kSiliconeHeight_m);
   const double apparent_Pa =
       half.on_punch_N(kSiliconeDiameter_m, strain * half.height_m()) / (half.top_area_m2() * strain);
   report.rows.push_back({.group = kClosedFormGroup,
@@ -84,7 +85,7 @@ void add_closed_forms(const ValidationOptions& options, ValidationReport& report
   add_hertz(Energy::six_link, 0.3, nodes, 0.03, report);
   add_hertz(Energy::trilinear, 0.3, nodes, 0.01, report);
   add_hertz(Energy::trilinear, 0.45, 5, 0.03, report);
-  // Near incompressibility the solver converges slowly. Here F is 16/9·E·√R·d^1.5.
+  // The solver converges slowly near incompressibility. With ν near 0.5, F is 16/9·E·√R·d^1.5.
   if (!options.quick) add_hertz(Energy::trilinear, 0.49, 5, 0.03, report);
 }
 

@@ -13,7 +13,8 @@ namespace {
 
 using Material = FemRow::Material;
 
-// A voxel on an interface belongs to the stiffer side, as one on the surface belongs to the object.
+// Label of a voxel. One on an interface belongs to the stiffer side, as one on the surface belongs to the
+// object.
 std::uint8_t label_in(Material material, const glm::dvec3& at) {
   constexpr double e = 1e-9;
   if (material == Material::layers) return at.z > 0.055 + e ? 3 : at.z > 0.04 - e ? 2 : 1;
@@ -46,7 +47,7 @@ constexpr std::array kGroups{Group{Material::uniform, "block of one material"},
                              Group{Material::layers, "block of three layers"},
                              Group{Material::inclusion, "block with a stiff inclusion"}};
 
-// The worst of all presses of one material: three widths of the punch, three values of ν.
+// Adds the worst of all presses of one material: three widths of the punch, three values of ν.
 void add_worst(const Group& group, Energy energy, double spacing_m, ValidationReport& report) {
   ValidationRow worst{.group = "finite elements", .source = kFemSource, .unit = "N"};
   int presses = 0;

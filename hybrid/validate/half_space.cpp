@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kDepthInRadii = 10.0;  // of the block, in radii of the contact
+constexpr double kDepthInRadii = 10.0;  // depth of the block, in radii of the contact
 
 }  // namespace
 
@@ -27,7 +27,7 @@ double bonded_layer_factor(double poisson, double share) {
 }
 
 double half_space_factor(Energy energy, double poisson, double depth_per_radius, int nodes) {
-  const double contact = nodes;  // with a spacing of 1
+  const double contact = nodes;  // radius of the contact; the spacing is 1
   const double radius = contact / std::sqrt(depth_per_radius), depth = radius * depth_per_radius;
   const double deep = kDepthInRadii * contact;
   PressedSpecimen block(

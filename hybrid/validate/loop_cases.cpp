@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole sessions on an ideal device: what the tick makes of objects that have a closed form.
+// Whole sessions on an ideal device: forces of the tick on objects that have a closed form.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -35,7 +35,7 @@ SessionResult played(const Scene& scene, bool keep_rows) {
   return run_session(scene, built, options);
 }
 
-// The row with the deepest device position that is the last of its kind: the end of the hold.
+// The last row with the deepest device position, which is the end of the hold.
 const TraceRow& end_of_hold(const std::vector<TraceRow>& rows) {
   const auto deepest = std::ranges::min_element(
       rows, [](const TraceRow& a, const TraceRow& b) { return a.device_m.z < b.device_m.z; });
@@ -63,7 +63,8 @@ void add_rigid(const char* name, const RigidSource& source, double top_m, Valida
        .stated = true});
 }
 
-// The tick's force after a hold, against the tissue relaxed alone with the tool at the same place.
+// Compares the tick's force after a hold with that of the same tissue, relaxed alone with the tool at the
+// same place.
 void add_soft(Energy energy, ValidationReport& report) {
   constexpr double spacing_m = 2e-3, poisson = 0.3, young_Pa = 10e3;
   constexpr double wide_m = 60e-3, deep_m = 30e-3;
@@ -81,7 +82,7 @@ void add_soft(Energy energy, ValidationReport& report) {
   const TraceRow& row = end_of_hold(result.rows);
   const double force_N = glm::length(row.force_N);
   const double depth_m = 0.5 * deep_m + kToolRadius_m - row.device_m.z - force_N / kCoupling_N_per_m;
-  // The lattice of a scene begins half a spacing inside the object, and is felt at its surface.
+  // The lattice of a scene's object begins half a spacing inside its surface, but contact is at the surface.
   PressedSpecimen alone({.size_m = {wide_m - spacing_m, wide_m - spacing_m, deep_m - spacing_m},
                          .spacing_m = spacing_m,
                          .energy = energy,

@@ -12,13 +12,13 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFitDepth_m = 1e-3;      // E is taken here
-constexpr double kClaimedDepth_m = 2e-3;  // and this force is predicted
+constexpr double kFitDepth_m = 1e-3;      // E is fitted to the force at this depth
+constexpr double kClaimedDepth_m = 2e-3;  // the force at this depth is predicted
 constexpr double kFirstDepth_m = 0.5e-3;
 // Thickness and width of the samples are not published. The block is 16 mm (pork) or 20 mm (liver) thick.
 constexpr double kBlockWide = 8.0, kBlockDeep = 5.0;  // in radii of the ball
 
-// Force of a ball on the block over its depth, in units of E·R² and R, at rest.
+// Force of a ball on the block at rest, over depth. Units: E·R² and R.
 class ForceCurve {
  public:
   ForceCurve(Energy energy, double poisson, int nodes_a_radius) {
@@ -31,7 +31,7 @@ class ForceCurve {
       steady_.push_back(block.on_ball_N(1.0, depth) / std::pow(depth, 1.5));
     }
   }
-  // Hertz's power is taken out, so that what is interpolated varies slowly.
+  // Interpolates force / depth^1.5, which varies slowly: Hertz's power of the depth is divided out.
   [[nodiscard]] double at(double depth) const {
     if (!(depth > 0.0)) return 0.0;
     const auto above = std::ranges::upper_bound(depth_, depth);
@@ -63,13 +63,15 @@ Fit fit_modulus(const ForceCurve& curve, const ProbedTissue& tissue, double offs
   return {.scale_N = at_depth(tissue, kFitDepth_m).median_N / shape, .offset_m = offset_m};
 }
 
-// The contact may have begun before depth 0 ("light contact"): both are taken from the first two depths.
+// Fits E and the start of the contact to the first two depths. The contact may have begun before depth 0
+// ("light contact").
 Fit fit_modulus_and_contact(const ForceCurve& curve, const ProbedTissue& tissue) {
   const double first_N = at_depth(tissue, kFirstDepth_m).median_N;
   double low_m = -0.4e-3, high_m = 2e-3;
   for (int n = 0; n < 60; ++n) {
     const double middle_m = 0.5 * (low_m + high_m);
-    // The earlier the contact began, the larger is the share of the force that the first depth has.
+    // The earlier the contact began, the larger is the force at the first depth relative to that at
+    // kFitDepth_m.
     const bool more = fit_modulus(curve, tissue, middle_m).at(curve, tissue, kFirstDepth_m) < first_N;
     (more ? low_m : high_m) = middle_m;
   }
@@ -189,7 +191,7 @@ void add_cartilage(const ValidationOptions& options, ValidationReport& report) {
                         .x = {0.0},
                         .ours = {0.0},
                         .series = {{.name = "measured, one site", .measured = {}}}};
-  constexpr double kClaimedFrom = 0.01;  // depth in radii
+  constexpr double kClaimedFrom = 0.01;  // least depth of the stated rows, in radii
   for (const Indented& point : cartilage()) {
     say(options, fmt::format("cartilage at {:.2f} µm", 1e6 * point.reading_m));
     const double depth_m = point.reading_m - kCartilageContact_m, share = depth_m / kCartilageBall_m;

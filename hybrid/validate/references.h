@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What others measured or computed: summary figures, with their credit and limits.
+// Results that others measured or computed: summary figures, with their credit and limits.
 #pragma once
 
 #include <array>
@@ -12,21 +12,22 @@ namespace hybrid {
 // ---- finite elements ----
 
 // CalculiX 2.20, 8-node bricks with incompatible modes (C3D8I) on a grid of the given spacing. A block of 100
-// × 100 × 60 mm with a bonded base and free sides is pressed 1 mm deep by a rigid, frictionless square punch.
+// × 100 × 60 mm has a bonded base and free sides. A rigid, frictionless square punch presses it 1 mm deep.
 inline constexpr const char* kFemSource = "CalculiX 2.20 (C3D8I), same grid";
 inline constexpr double kFemDepth_m = 1e-3;
 struct FemRow {
-  // 10 kPa; layers: 10 kPa to 40 mm, 30 kPa to 55 mm, 5 kPa above; inclusion: 100 kPa in 35 to 65 × 35 to 65
-  // × 30 to 45 mm, 10 kPa around it.
+  // Young's moduli. uniform: 10 kPa. layers: 10 kPa up to a height of 40 mm, 30 kPa up to 55 mm, 5 kPa above.
+  // inclusion: 100 kPa in 35 to 65 × 35 to 65 × 30 to 45 mm, and 10 kPa around it.
   enum class Material : std::uint8_t { uniform, layers, inclusion } material;
-  double spacing_m, width_m, poisson, force_N;  // width: between the outermost pressed nodes
+  double spacing_m, width_m, poisson, force_N;  // width: distance between the outermost pressed nodes
 };
 std::span<const FemRow> fem_rows();
 
 // ---- silicone between plates ----
 
-// A cylinder is compressed at 10 mm/min, ten tests a material. Friction at the plates is not stated. Below 2
-// % strain the casts are still seating. Mean and standard deviation are computed from the published curves.
+// A cylinder is compressed at 10 mm/min, in ten tests for each material. Friction at the plates is not
+// published. Below 2 % strain the casts are still seating. Mean and standard deviation are computed from the
+// published curves.
 inline constexpr const char* kSiliconeSource =
     "Dawood et al. 2026, tissue-phantom-material-database (CC BY 4.0), mean and SD of 10 tests";
 inline constexpr double kSiliconeDiameter_m = 0.05, kSiliconeHeight_m = 0.03;
@@ -37,15 +38,15 @@ struct MeanAndDeviation {
 struct Silicone {
   const char* name;
   bool pure;                                  // without thinner
-  double published_kPa;                       // Young's modulus of the authors; 0: not known here
-  std::array<MeanAndDeviation, 4> at_strain;  // as kSiliconeStrains
+  double published_kPa;                       // Young's modulus that the authors published; 0: not known here
+  std::array<MeanAndDeviation, 4> at_strain;  // at kSiliconeStrains
 };
 std::span<const Silicone> silicones();
 
 // ---- ex-vivo tissue under a ball ----
 
-// Quartiles over the sites of a set, from light contact along the normal. Thickness and support are not
-// stated. Sets with negative forces are left out.
+// Quartiles over the sites of a set. Depth is measured along the normal, from light contact. Thickness and
+// support are not published. Sets with negative forces are left out.
 inline constexpr const char* kProbingSource =
     "Vanderbilt, robot-palpation-data (ICRA 2016, doi 10.1109/ICRA.2016.7487224 and .7487225), quartiles "
     "over sites";
@@ -54,7 +55,7 @@ struct ProbedDepth {
 };
 struct ProbedTissue {
   const char* name;
-  bool pork;      // else liver
+  bool pork;      // true: pork, false: liver
   double ball_m;  // radius
   int sites;
   std::vector<ProbedDepth> depths;
@@ -63,7 +64,7 @@ std::span<const ProbedTissue> probed_tissues();
 
 // ---- cartilage under a sphere ----
 
-// Loading of one site at 500 µN/min. The authors' instrument fits Hertz to 10 to 98 % of the load.
+// One site, loaded at 500 µN/min. The authors' instrument fits Hertz to 10 to 98 % of the load.
 inline constexpr const char* kCartilageSource =
     "artorg-unibe-ch, CartilageIndentationAnalysis, Crosslinking 1, one site";
 inline constexpr double kCartilageBall_m = 0.5e-3, kCartilageYoung_Pa = 755.6e3, kCartilagePoisson = 0.3;

@@ -13,12 +13,13 @@
 namespace hybrid {
 namespace {
 
-constexpr double kPoisson = 0.49;  // silicone keeps its volume; the most that bricks take
-// A linear law that is right at 5 % strain is 5.5 % below an incompressible neo-Hookean at 10 %, and that one
-// is within 7 % of these materials. So the linear law has to be within 13 % there.
+constexpr double kPoisson = 0.49;  // silicone keeps its volume; this is the highest ν that bricks take
+// A linear law that is right at 5 % strain is 5.5 % below an incompressible neo-Hookean law at 10 %. The
+// neo-Hookean law is within 7 % of these materials. So the linear law must be within 13 % at 10 % strain.
 constexpr double kBoundAtTen = 0.13;
 
-constexpr double kBeside = 0.15;  // % strain: points of grades are drawn beside one another
+// % strain; offset between the points of different grades, so that they do not overlap.
+constexpr double kBeside = 0.15;
 
 double area_m2() {
   return 0.25 * std::numbers::pi * kSiliconeDiameter_m * kSiliconeDiameter_m;
@@ -26,9 +27,10 @@ double area_m2() {
 
 using Forces = std::array<double, kSiliconeStrains.size()>;
 
-// Forces (N) of the cylinder with a modulus of 1 Pa, for its true area.
+// Forces (N) of the cylinder with a modulus of 1 Pa. They are scaled from the lattice's area to the true one.
 Forces forces_per_Pa(bool bonded, double spacing_m) {
-  // Bonded to both plates: half of the cylinder, whose middle plane stays flat and slips.
+  // A cylinder that is bonded to both plates is modelled by its lower half. Its middle plane stays flat and
+  // slips.
   const double height_m = bonded ? 0.5 * kSiliconeHeight_m : kSiliconeHeight_m;
   PressedSpecimen cylinder({.shape = Specimen::Shape::cylinder,
                             .size_m = {kSiliconeDiameter_m, kSiliconeDiameter_m, height_m},
@@ -66,7 +68,7 @@ void add_rows(const Silicone& silicone, const Forces& per_Pa, ValidationReport& 
   }
 }
 
-// All materials of one family, each relative to its force at 5 % strain.
+// All materials of one family. Each force is relative to that at 5 % strain.
 ValidationPanel family_panel(std::string_view family, const Forces& per_Pa) {
   ValidationPanel panel{.group = "silicone",
                         .title = std::string(family),
@@ -102,7 +104,7 @@ std::string silicone_quantity(std::size_t strain) {
 }
 
 void add_silicones(const ValidationOptions& options, ValidationReport& report) {
-  // Between slipping plates the strain is the same everywhere, and the spacing does not matter.
+  // Between slipping plates the strain is uniform, so a coarse spacing is exact.
   constexpr double kCoarse_m = 2.5e-3, kFine_m = 1.25e-3;
   say(options, "silicone between slipping plates");
   const Forces slipping = forces_per_Pa(false, kCoarse_m);

@@ -12,20 +12,20 @@
 namespace hybrid {
 namespace {
 
-// At rest: the largest force left on a voxel, as a share of the force that doubles the length of a link.
+// At rest no voxel has a larger residual force. Unit: the force that doubles the length of a link.
 constexpr double kAtRest = 1e-5;
-constexpr double kSteady = 1e-6;  // or: the change of the energy in a cycle, as a share
+constexpr double kSteady = 1e-6;  // or at rest: relative change of the energy in a cycle
 constexpr int kMostCycles = 2000;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-// So wide that no limit of a link is reached: the specimen is elastic.
+// These limits are so wide that no link reaches them. So the specimen is elastic.
 constexpr double kShortest = 0.02, kLongest = 20.0, kMostShear = 20.0;
-constexpr double kRounding = 1e-9;  // m, of places on the grid
+constexpr double kRounding = 1e-9;  // m; tolerance of positions on the grid
 
 int nodes_along(double length_m, double spacing_m) {
   return static_cast<int>(std::lround(length_m / spacing_m)) + 1;
 }
 
-// Does a node belong to a cell whose centre lies in the circle? So no node is left without a whole cell.
+// Does the node belong to a cell whose centre lies in the circle? By this rule every node has a whole cell.
 bool in_round_cells(const glm::dvec2& node, double radius_m, double h) {
   for (const double x : {-0.5 * h, 0.5 * h}) {
     for (const double y : {-0.5 * h, 0.5 * h}) {
@@ -111,7 +111,7 @@ double PressedSpecimen::pressed_N(const voxel::ToolInBody& tool, double within_m
 }
 
 double PressedSpecimen::on_ball_N(double radius_m, double depth_m) {
-  // The lattice ends half a spacing inside the surface that is felt.
+  // Contact is at the surface, which is half a spacing outside the lattice.
   voxel::ToolInBody tool;
   tool.radius = radius_m - object_->voxel_radius();
   tool.centre = {middle_m_, height_m_ + radius_m - depth_m};
@@ -142,7 +142,7 @@ double PressedSpecimen::under_square_N(double width_m, double depth_m) {
   for (int cycle = 0; cycle < kMostCycles; ++cycle) {
     object_->relax_cycle();
     const double now_J = object_->energy_J();
-    // The energy of an elastic body at rest is half the work of its force.
+    // An elastic body at rest has stored half of (force · depth).
     if (object_->asleep() || std::fabs(now_J - before_J) < kSteady * now_J) return 2.0 * now_J / depth_m;
     before_J = now_J;
   }

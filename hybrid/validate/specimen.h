@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A piece of tissue on the program's own lattice, pressed to a given depth and relaxed until it is at rest.
-// There is no hand, device or coupling: the depth is that of the tool in the tissue.
+// A piece of tissue on the program's own lattice. It is pressed to a given depth and relaxed until it is at
+// rest. There is no hand, device or coupling: the depth is that of the tool in the tissue.
 #pragma once
 
 #include <array>
@@ -14,18 +14,20 @@
 
 namespace hybrid {
 
-// z is up, and the specimen stands on z = 0 with its middle at x = y = 0. There is a voxel at each node of
-// the grid, so the lattice ends where the specimen does.
+// z is up. The specimen stands on z = 0, with its middle at x = y = 0. There is a voxel at each node of the
+// grid, so the lattice has the specimen's size.
 struct Specimen {
   enum class Shape : std::uint8_t { block, cylinder } shape = Shape::block;
-  glm::dvec3 size_m{0.0};  // of the block; x: diameter, z: height of the cylinder
+  glm::dvec3 size_m{0.0};  // size of the block; of a cylinder, x: diameter, z: height
   double spacing_m = 1e-3;
   Energy energy = Energy::six_link;
   double poisson = 0.3;
-  // By label, from 1 on. Forces are proportional to the modulus, as long as no limit of a link is reached.
+  // Modulus of each label, from 1 on. Forces are proportional to the moduli as long as no link reaches a
+  // limit.
   std::vector<double> young_Pa{1.0};
-  std::function<std::uint8_t(const glm::dvec3&)> label{};  // of a place; empty: 1
-  // The base slips on a plate; else it is bonded to it. One voxel in its middle is held.
+  std::function<std::uint8_t(const glm::dvec3&)> label{};  // label at a position; empty: 1 everywhere
+  // If true, the base slips on a plate, and one voxel in its middle is held. If false, it is bonded to the
+  // plate.
   bool slipping_base = false;
 };
 
@@ -39,15 +41,15 @@ class PressedSpecimen {
   PressedSpecimen(PressedSpecimen&&) = delete;
   PressedSpecimen& operator=(PressedSpecimen&&) = delete;
 
-  // Upward force (N) of the tissue at rest on a frictionless tool that has pressed the middle of the top by
-  // `depth_m`. Depths have to grow from call to call. Not a number if the tissue did not come to rest.
+  // Upward force (N) of the tissue at rest on a frictionless tool that presses the middle of the top by
+  // `depth_m`. Depths must grow from call to call. Not a number if the tissue did not come to rest.
   double on_ball_N(double radius_m, double depth_m);
-  double on_punch_N(double radius_m, double depth_m);  // flat and round; larger than the top: a plate
-  // The nodes of the top within a square of this width (m) are at `depth_m`, and free to slip. Of a fresh
-  // specimen, once.
+  double on_punch_N(double radius_m, double depth_m);  // flat round punch; one larger than the top is a plate
+  // Force (N) when the nodes of the top within a square of this width are pressed to `depth_m` and are free
+  // to slip. May be called once, on a fresh specimen.
   double under_square_N(double width_m, double depth_m);
 
-  [[nodiscard]] double top_area_m2() const;  // of the lattice: the whole cells of the top
+  [[nodiscard]] double top_area_m2() const;  // area of the lattice's whole cells at the top
   [[nodiscard]] double height_m() const { return height_m_; }
 
  private:

@@ -19,7 +19,7 @@ std::string spread_words(const ValidationRow& row) {
   return row.low && row.high ? fmt::format("{:.4g} to {:.4g}", *row.low, *row.high) : "";
 }
 
-// In percent to one decimal; no "-0.0".
+// Share in percent, rounded to one decimal. Never "-0.0".
 double percent(double share) {
   return std::round(1000.0 * share) / 10.0 + 0.0;
 }

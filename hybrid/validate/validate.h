@@ -10,26 +10,26 @@
 
 namespace hybrid {
 
-// One figure of the program beside one of a reference.
+// One result of the program beside that of a reference.
 struct ValidationRow {
-  std::string group{}, name{};  // "silicone"; the case
+  std::string group{}, name{};  // for example "silicone"; name of the case
   std::string source{};         // of the reference, with its credit
-  std::string quantity{};       // "force at 10 % strain"
+  std::string quantity{};       // for example "force at 10 % strain"
   std::string unit{};
   double reference = 0.0, ours = 0.0;
   std::optional<double> low{}, high{};  // spread of the reference
-  // Largest difference, as a share of the reference. Empty: `ours` has to lie within the spread.
+  // Greatest allowed difference, as a share of the reference. Empty: `ours` must lie within the spread.
   std::optional<double> bound{};
-  bool stated = false;  // the program states that this holds; else it is shown beside
-  bool detail = false;  // left out of the table for the terminal unless it fails
-  std::string why{};    // the reason if it lies outside
+  bool stated = false;  // true: the program claims that the row holds; false: it is only shown
+  bool detail = false;  // left out of the terminal's table unless it fails
+  std::string why{};    // reason for a result that lies outside
 
   [[nodiscard]] double difference() const { return ours / reference - 1.0; }
   [[nodiscard]] bool inside() const;
   [[nodiscard]] bool fails() const { return stated && !inside(); }
 };
 
-// Force over depth or strain: a panel of a figure.
+// A panel of a figure: force over depth or strain.
 struct ValidationPoint {
   double x = 0.0, y = 0.0, low = 0.0, high = 0.0;
 };
@@ -43,10 +43,10 @@ struct ValidationPanel {
   std::vector<ValidationSeries> series;
 };
 
-// Young's modulus of a silicone that gives its force at 5 % strain.
+// Young's moduli with which a silicone has its measured force at 5 % strain.
 struct FittedModulus {
   std::string name;
-  double slipping_Pa = 0.0, bonded_Pa = 0.0;  // at the plates
+  double slipping_Pa = 0.0, bonded_Pa = 0.0;  // with slipping plates; bonded to the plates
   std::optional<double> published_Pa;
 };
 
@@ -64,10 +64,10 @@ struct ValidationOptions {
 
 ValidationReport validate(const ValidationOptions& options);
 
-// What the report comes to.
+// Summary of the report.
 struct ValidationCount {
-  std::size_t stated = 0, failed = 0;          // cases that have to hold, and those that do not
-  std::size_t beside = 0, beside_outside = 0;  // the others
+  std::size_t stated = 0, failed = 0;          // rows that must hold; those of them that do not
+  std::size_t beside = 0, beside_outside = 0;  // the other rows; those of them that lie outside
 };
 ValidationCount count(const ValidationReport& report);
 std::string verdict(const ValidationReport& report);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDot = 6.0, kBar = 1.6;  // pixels
 
-// Error bars, and a dot in each: samples between gaps are drawn as dots.
+// Adds an error bar for each point and a dot on it. A sample between gaps is drawn as a dot.
 void add_measured(const ValidationSeries& series, const std::string& colour, Panel& panel) {
   constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
   Series bars{.name = series.name, .x = {}, .y = {}, .colour = colour, .width = kBar};
@@ -49,7 +49,7 @@ std::optional<PageFigure> figure_of(const ValidationReport& report, const std::s
     panel.height = 210.0;
     panel.from_zero = true;
     panel.series.push_back({.name = "hybrid", .x = one.x, .y = one.ours, .colour = "#000000", .width = 2.0});
-    // Room at the end, so that the last point is not cut.
+    // A gap at the end makes room, so that the last point is not cut off.
     panel.series.push_back({.name = {}, .x = {1.05 * one.x.back()}, .y = {std::nan("")}});
     for (std::size_t s = 0; s < one.series.size(); ++s) add_measured(one.series[s], series_colour(s), panel);
   }
@@ -73,7 +73,7 @@ bool is_of(const ValidationRow& row, const std::vector<std::string>& groups) {
   return std::ranges::find(groups, row.group) != groups.end();
 }
 
-// The source that all rows of the groups have; empty if there are several.
+// The source of all rows of the groups; empty if there are several.
 std::string one_source(const ValidationReport& report, const std::vector<std::string>& groups) {
   std::string source;
   for (const ValidationRow& row : report.rows) {
@@ -84,7 +84,7 @@ std::string one_source(const ValidationReport& report, const std::vector<std::st
   return source;
 }
 
-// A value of any size, and the text of four digits that stands for it.
+// A value of any size, with a text of four digits.
 PageCell digits_cell(std::optional<double> value) {
   if (!value) return {.text = "–"};
   return {.text = fmt::format("{:.4g}", *value), .value = value};
@@ -94,8 +94,8 @@ std::string spread_text(const ValidationRow& row) {
   return row.low && row.high ? fmt::format("{:.4g} to {:.4g}", *row.low, *row.high) : "–";
 }
 
-// Rows of the groups. The column of sources is left out where all have the same one.
-// Rows of the groups. Columns of the spread and of the source are left out where they would say nothing.
+// A table of the groups' rows. There is a column of spreads only if a row has one, and a column of sources
+// only if there are several sources.
 PageTable table_of(const ValidationReport& report, const std::vector<std::string>& groups,
                    const std::string& name, const std::string& caption) {
   const bool with_sources = one_source(report, groups).empty();
@@ -160,7 +160,7 @@ PageSection fem_section(const ValidationReport& report) {
                     table_of(report, {"finite elements"}, "finite-elements", "Against finite elements")}};
 }
 
-// "3 to 12 % low": the differences of all silicones at one of their strains.
+// The differences of all silicones at one of their strains, for example "3 to 12 % low".
 std::string shortfall(const ValidationReport& report, std::size_t strain) {
   double least = std::numeric_limits<double>::infinity(), most = -least;
   for (const ValidationRow& row : report.rows) {

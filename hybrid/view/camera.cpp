@@ -15,11 +15,11 @@ namespace hybrid {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double kNearTools = 3.5;  // half the height of the nearer view, in radii of the tool
-constexpr double kFilled = 0.9;     // share of the view that the whole scene takes
+constexpr double kNearTools = 3.5;  // half the height of the nearer view, in tool radii
+constexpr double kFilled = 0.9;     // share of the view that the scene fills
 
-// Visits every `stride`-th finite vertex of the scene in its present state. The stride bounds the cost: a
-// large mesh costs no more than a small one.
+// Visits every `stride`-th finite vertex of the scene in its present state. The stride bounds the cost for
+// large meshes.
 template <class Visit>
 void for_some_vertices(const DrawnScene& scene, const Snapshot& snapshot, const Visit& visit) {
   constexpr std::size_t at_most = 100'000;
@@ -46,7 +46,7 @@ struct Bounds {
   }
   [[nodiscard]] SceneBounds ball() const {
     SceneBounds bounds;
-    if (!(lower.x <= upper.x)) return bounds;  // nothing finite: an empty picture about the origin
+    if (!(lower.x <= upper.x)) return bounds;  // no finite point: an empty picture about the origin
     bounds.centre_m = 0.5 * (lower + upper);
     bounds.radius_m = 0.5 * glm::length(upper - lower);
     // A scene that is a single point still needs a view of some size.
@@ -55,7 +55,8 @@ struct Bounds {
   }
 };
 
-// Every vertex and, of a snapshot, the tool; and the tool along a path.
+// Box around every vertex and the tool along a path. With a snapshot, also the tool at the proxy and at the
+// device.
 Bounds box_of(const DrawnScene& scene, const Snapshot* snapshot, std::span<const glm::dvec3> path_m) {
   Bounds box;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
@@ -80,8 +81,8 @@ struct Candidate {
   double hidden = 0.0;  // weighted share of the view cone that is covered
 };
 
-// Adds to each candidate direction the solid angle that triangles cover within a cone about it, seen from the
-// tool.
+// Measures how far triangles hide the tool in each candidate direction. Adds the solid angle that they cover
+// in a cone about the direction, seen from the tool.
 void add_hidden(const DrawnScene& scene, const Snapshot& snapshot, std::span<Candidate> candidates) {
   constexpr double cone = 12.0 * degree;
   constexpr std::size_t at_most = 60'000;
@@ -192,8 +193,8 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
   }
   if (polygon::is_finite(snapshot.proxy_m)) add_hidden(scene, snapshot, candidates);
 
-  // Preferred: the side that the force points to (the tool is there), but oblique, so that depth shows; a
-  // little above the horizon; the front.
+  // Preferred directions: from the side to which the force points, because the tool is there, but oblique, so
+  // that depth shows; a little above the horizon; from the front.
   const auto cost = [&](const Candidate& candidate) {
     return std::min(candidate.hidden, 1.5) + 0.8 * std::abs(glm::dot(candidate.toward_eye, pushed) - 0.4) +
            0.004 * std::abs(candidate.elevation / degree - 25.0) +

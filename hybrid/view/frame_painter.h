@@ -16,20 +16,20 @@ namespace hybrid {
 struct FrameOptions {
   int width = 0, height = 0;  // (pixels)
   bool inset = true;          // draw a nearer view of the contact if it is kLeastNearer times nearer
-  std::string help, notice;   // one line below the scene; a message above it. Empty: none
+  std::string help, notice;   // one line below the scene; a message above it; empty: none
   bool paused = false;
   ViewSettings view;
-  OverlayPanel* panel = nullptr;  // null: none
+  OverlayPanel* panel = nullptr;  // in place of the legend; null: the legend
 };
 
-// Needs a current OpenGL context for its whole life. Keeps a reference to the scene.
+// Needs a current OpenGL context as long as it lives. Keeps a reference to the scene.
 class FramePainter {
  public:
   FramePainter(const DrawnScene& scene, Samples samples, int height);
 
-  // Draws the frame off screen; then present() or read_rgb().
+  // Draws the frame off screen. Call present() or read_rgb() afterwards.
   void paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options);
-  // Frees what was made in the context; this one paints no more.
+  // Frees all objects in the context. This painter must not paint any more.
   void release() { renderer_.release(); }
   void present(int width, int height) { renderer_.present(width, height); }
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() { return renderer_.read_rgb(); }

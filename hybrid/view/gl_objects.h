@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The OpenGL objects that the renderer makes: programs, meshes in buffers, and textures to draw into. Every
-// call needs the renderer's context to be current. Objects end with the context, unless they are released.
+// The OpenGL objects of the renderer: programs, meshes in buffers, and textures that are drawn into. Every
+// call needs the renderer's context to be current. Objects live until they are released or the context ends.
 #pragma once
 
 #include <cstddef>
@@ -13,11 +13,11 @@
 
 namespace hybrid {
 
-// OpenGL's own types, by their definition: its header stays out of this one.
-using GlName = unsigned int;  // GLuint: an object or program
+// OpenGL's types, defined here so that its header need not be included.
+using GlName = unsigned int;  // GLuint: name of an object or program
 using GlEnum = unsigned int;  // GLenum
 
-// Throws std::runtime_error with the remedy: the context is older than OpenGL 3.3.
+// Throws std::runtime_error with the remedy if the context is older than OpenGL 3.3.
 void require_gl();
 // Does the context draw without a graphics card?
 [[nodiscard]] bool draws_in_software();
@@ -43,29 +43,30 @@ struct GlMesh {
   // Replaces the vertices. Orphans the old storage, so that the driver need not wait for the previous frame.
   void stream(const DrawMesh& mesh) const;
   void draw() const;
-  // Deletes the buffers; the mesh is empty then.
+  // Deletes the buffers. The mesh is empty afterwards.
   void release();
 };
 
-// A texture to draw into, sampled without filtering (unit of width and height: pixel).
+// A texture that is drawn into and sampled without filtering; width and height in pixels.
 GlName make_texture_target(GlEnum inner, GlEnum outer, GlEnum type, int width, int height);
 
 // Attaches textures to a framebuffer (0: none) and binds it. Throws std::runtime_error if the driver refuses.
 void attach_targets(GlName frame, GlName colour, GlName depth);
 
-// The overlay's triangles: pixels (y down), texture coordinates in the font atlas, colour 0xAABBGGRR.
+// A vertex of the overlay: position in pixels (y down), texture coordinates in the font atlas, colour
+// 0xAABBGGRR.
 struct OverlayVertex {
   float x = 0.0F, y = 0.0F, u = 0.0F, v = 0.0F;
   std::uint32_t colour = 0;
 };
 struct OverlayMesh {
   struct Batch {
-    std::size_t first = 0, count = 0;  // indices
-    PixelRect inside;                  // nothing is drawn outside of it
+    std::size_t first = 0, count = 0;  // range of `indices`
+    PixelRect inside;                  // clips the batch
   };
   std::vector<OverlayVertex> vertices;
   std::vector<std::uint32_t> indices;
-  std::vector<Batch> batches;  // in the order in which they are drawn
+  std::vector<Batch> batches;  // in drawing order
 };
 struct FontAtlas {
   int width = 0, height = 0;
@@ -78,7 +79,7 @@ class GlOverlay {
   void create();
   void set_font(const FontAtlas& atlas);
   void release();
-  // Into the bound framebuffer of this many pixels.
+  // Draws into the bound framebuffer, which has this many pixels.
   void draw(const OverlayMesh& overlay, int width, int height) const;
 
  private:

@@ -7,14 +7,16 @@
 namespace hybrid {
 namespace {
 
-// Heights and widths in heights of body text (em).
+// Lengths are in heights of body text (em).
 constexpr float kHeading = 4.4F;
 constexpr float kHelp = 1.9F;
 constexpr float kColumn = 25.0F;
-constexpr float kLeastScene = 16.0F;         // a narrower scene gets the column's place as well
-constexpr float kColumnShare = 1.0F / 3.0F;  // of the frame's width, at most
-constexpr float kInsetShare = 0.46F;         // of the column's height, at most
-constexpr float kInsetOfScene = 0.34F;       // of the scene's shorter side, beside a panel
+// Least width of the scene; if it would be narrower, there is no column.
+constexpr float kLeastScene = 16.0F;
+constexpr float kColumnShare = 1.0F / 3.0F;  // most width of the column, as a share of the frame's width
+constexpr float kInsetShare = 0.46F;         // most height of the inset, as a share of the column's height
+// Size of the inset beside a panel, as a share of the scene's shorter side.
+constexpr float kInsetOfScene = 0.34F;
 
 }  // namespace
 

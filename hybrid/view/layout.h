@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The places of the parts of a frame: a heading, the scene below it, and beside the scene a column for the
-// legend and the nearer view, so that neither covers the scene. Knows no graphics library.
+// The parts of a frame and their places: a heading, the scene below it, and beside the scene a column. The
+// column holds the legend and the nearer view, so that neither covers the scene. Knows no graphics library.
 #pragma once
 
 #include <optional>
@@ -19,22 +19,23 @@ float text_height(int frame_height);
 
 struct FrameLayout {
   PixelRect scene;
-  PixelRect column;  // on the right; width 0 where the frame is too narrow for one
-  PixelRect inset;   // square, at the lower end of the column or of the scene; width 0 without a column
+  PixelRect column;  // on the right; width 0 if the frame is too narrow for a column
+  // Square; at the lower end of the column, or of the scene if there is a panel; width 0 without a column.
+  PixelRect inset;
 
-  // Pixel of the frame at which a camera shows a point in the scene's rectangle; empty: behind the eye.
+  // Pixel of the frame at which a camera shows a point in the scene's rectangle; empty if behind the eye.
   [[nodiscard]] std::optional<glm::dvec2> pixel(const Camera& camera, const glm::dvec3& point_m) const;
   [[nodiscard]] double aspect() const;  // of the scene: width / height
 };
 
-// `help`: a line of help stands below the scene. `panel`: a window's panel fills the column, and the nearer
-// view is a corner of the scene.
+// `help`: a line of help is below the scene. `panel`: a window's panel fills the column, and the nearer view
+// is in a corner of the scene.
 FrameLayout frame_layout(int width, int height, bool help, bool panel = false);
 
-// A nearer view of the contact is worth its place from here on.
+// The nearer view of the contact is drawn only if it is at least this many times nearer.
 inline constexpr double kLeastNearer = 1.5;
 
-// How many times larger a camera shows its target in one rectangle than another in the other one.
+// Scale of `near` in the inset over that of `whole` in the scene's rectangle, both at their targets.
 double times_nearer(const Camera& near, const PixelRect& inset, const Camera& whole, const PixelRect& scene);
 
 }  // namespace hybrid

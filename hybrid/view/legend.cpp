@@ -17,9 +17,10 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kMostSingly = 6;  // untouched rigid objects that get a row each
-constexpr std::size_t kMostMaterials = palette::material.size() + 1;  // rows of one object's materials
-constexpr std::size_t kMostStripes = 4;                               // colours of one swatch
+constexpr std::size_t kMostSingly = 6;  // if more rigid objects are untouched, they share one row
+// Rows of one object's materials at most.
+constexpr std::size_t kMostMaterials = palette::material.size() + 1;
+constexpr std::size_t kMostStripes = 4;  // colours of one swatch at most
 
 std::string and_more(std::size_t count) {
   return "and " + std::to_string(count) + " more";
@@ -29,7 +30,7 @@ ObjectFeel feel_of(const Snapshot& snapshot, std::size_t object) {
   return object < snapshot.feel.size() ? snapshot.feel[object] : ObjectFeel{};
 }
 
-// The first few distinct colours.
+// The first kMostStripes distinct colours.
 std::vector<glm::vec3> stripes(std::span<const glm::vec3> colours) {
   std::vector<glm::vec3> few;
   for (const glm::vec3& c : colours) {
@@ -59,7 +60,7 @@ std::optional<std::size_t> material_touched(const DrawnScene& scene, const Snaps
   return nearest;
 }
 
-// The objects that get a row each, in row order, and the rigid objects that share one row.
+// The objects with a row of their own, in row order, and the rigid objects that share one row.
 struct ShownObjects {
   std::vector<std::size_t> singly, grouped;
 };
@@ -75,7 +76,7 @@ ShownObjects choose_objects(const DrawnScene& scene, const Snapshot& snapshot, s
   for (std::size_t i = 0; i < scene.objects.size(); ++i)
     (group && untouched_rigid(i) ? shown.grouped : shown.singly).push_back(i);
   if (!group && shown.singly.size() <= most) return shown;
-  // A list that is cut off begins with touched objects, then soft ones.
+  // If the list is cut off, touched objects come first, then soft ones.
   const auto rank = [&](std::size_t i) {
     return feel_of(snapshot, i).contact ? 0 : scene.objects[i].soft ? 1 : 2;
   };
@@ -93,7 +94,7 @@ void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Sna
                   .kind = drawn.soft ? "soft" : "rigid",
                   .force = feel.contact ? force_text(feel.force_N) : "-",
                   .touched = feel.contact});
-  // What a cut shows and the surface hides.
+  // Materials that the surface hides and a cut shows.
   if (object < snapshot.inside.size() && snapshot.inside[object].used && material_rows > 0) {
     const std::vector<glm::vec3> within = palette::of_inside(scene, object);
     for (std::size_t m = std::max<std::size_t>(drawn.materials.size(), 1); m < within.size(); ++m) {
@@ -107,7 +108,7 @@ void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Sna
   const std::size_t listed =
       count <= material_rows ? count : material_rows - std::min<std::size_t>(material_rows, 1);
   if (listed == 0) return;
-  // A touched material is always listed, in the place of the last one if necessary.
+  // A touched material is always listed, if necessary in place of the last one.
   std::vector<std::size_t> order(count);
   std::iota(order.begin(), order.end(), std::size_t{0});
   const std::optional<std::size_t> touched = material_touched(scene, snapshot, object);
@@ -136,7 +137,7 @@ void add_tool(std::vector<LegendRow>& rows, const DrawnScene& scene, const Snaps
                   .force = force_text(glm::length(snapshot.force_N))});
 }
 
-// One row for several rigid objects; it names the first.
+// One row for several rigid objects, with the name of the first.
 LegendRow grouped_row(const DrawnScene& scene, std::span<const std::size_t> objects) {
   std::vector<glm::vec3> colours;
   for (const std::size_t i : objects.first(std::min(objects.size(), 2 * palette::rigid.size())))

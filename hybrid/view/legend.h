@@ -13,16 +13,16 @@ namespace hybrid {
 
 struct LegendRow {
   std::vector<glm::vec3> swatch{};              // colours side by side; empty: no swatch
-  std::string name{}, more{}, kind{}, force{};  // `more` follows the name, and is never shortened
+  std::string name{}, more{}, kind{}, force{};  // `more` follows the name and is never shortened
   bool touched = false;
-  bool within = false;  // a material of the object above
+  bool within = false;  // a material of the object in a row above
   float alpha = 1.0F;   // of the swatch
 };
 
-// One row for each object and for each material that its surface shows, then tool and force; about `most`
-// rows. Rows that do not fit are counted in a last row: first the materials with the least surface, then
-// rigid objects that nothing touches, then other objects. Many untouched rigid objects share one row from the
-// start. A material under the tool is marked like its object.
+// One row for each object and for each material that its surface shows, then tool and force: about `most`
+// rows. If they do not fit, some are left out, and a last row counts them. Left out first are the materials
+// with the least surface, then rigid objects that nothing touches, then other objects. Many untouched rigid
+// objects always share one row. A material under the tool is marked like its object.
 std::vector<LegendRow> legend_rows(const DrawnScene& scene, const Snapshot& snapshot, std::size_t most);
 
 }  // namespace hybrid

@@ -16,9 +16,9 @@ namespace hybrid {
 
 namespace {
 
-constexpr float kScaleWidth = 12.0F;  // of the colour scale in a corner of the scene (em)
+constexpr float kScaleWidth = 12.0F;  // width of the colour scale in a corner of the scene (em)
 
-// The panel fills the column: the scale is in the scene's upper corner beside it.
+// Place of the colour scale while a panel fills the column: the scene's upper right corner.
 PixelRect colour_scale_beside_panel(const Pen& pen, const PixelRect& scene) {
   const int margin = static_cast<int>(0.6F * pen.em), width = static_cast<int>(kScaleWidth * pen.em);
   return {scene.x + scene.width - width - margin, scene.y, width,
@@ -32,8 +32,8 @@ struct Overlay::State {
   Pen pen;
   FontAtlas atlas;
 
-  // Takes a system font that is known to be legible at any size and to have more than Latin letters. Without
-  // one, takes the embedded font, which is drawn for 13 pixels and sharp only at multiples of 13.
+  // Takes a system font that is legible at any size and has more than Latin letters. If there is none, takes
+  // the embedded font, which is drawn for 13 pixels and sharp only at multiples of 13.
   void choose_fonts(int height) {
     ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
     ImFontConfig config;
@@ -64,10 +64,10 @@ Overlay::Overlay(int height) : state_(std::make_unique<State>()) {
   state_->context = ImGui::CreateContext();
   ImGui::SetCurrentContext(state_->context);
   ImGuiIO& io = ImGui::GetIO();
-  io.IniFilename = nullptr;  // leaves no file behind
+  io.IniFilename = nullptr;  // ImGui must not leave a file behind
   io.LogFilename = nullptr;
-  io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;  // build() adds the offsets, so that more than
-                                                              // 65,536 vertices work
+  io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;  // build() adds the offsets: there may be
+                                                              // more than 65,536 vertices
   state_->choose_fonts(height);
   unsigned char* pixels = nullptr;
   io.Fonts->GetTexDataAsAlpha8(&pixels, &state_->atlas.width, &state_->atlas.height);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text and charts on a picture: title, time, legend, colour scale, scale bar and labels; in the window
-// also a panel and a help line. It uses Dear ImGui without a backend: the output is triangles in pixels. Its
-// parts are in overlay_parts.h. Only it, text_painter.cpp and the window's panel know ImGui.
+// The text and charts on a picture: title, time, legend, colour scale, scale bar and labels. In a window also
+// a panel and a help line. It uses Dear ImGui without a backend: the output is triangles in pixels. Its parts
+// are in overlay_parts.h. Only this class, text_painter.cpp and the window's panel use ImGui.
 #pragma once
 
 #include <functional>
@@ -23,14 +23,15 @@ struct OverlayContent {
   int width = 0, height = 0;  // of the picture (pixels)
   FrameLayout layout;
   Camera camera;
-  struct Inset {  // second, nearer view of the contact, in the layout's place for it
+  struct Inset {  // second, nearer view of the contact, in the layout's inset
     Camera camera;
     double nearer = 1.0;  // times_nearer()
   };
   std::optional<Inset> inset;
-  double displacement_scale_m = 0.0;  // 0: nothing soft has moved, no colour scale
-  // Window only:
-  OverlayPanel* panel = nullptr;  // null: the legend instead
+  // End of the colour scale; 0: nothing soft has moved, and there is no scale.
+  double displacement_scale_m = 0.0;
+  // Only in a window:
+  OverlayPanel* panel = nullptr;  // in place of the legend; null: the legend
   std::string help;               // one line; empty: none
   std::string notice;             // a message of a few lines; empty: none
   bool paused = false, dark = false;
@@ -38,7 +39,7 @@ struct OverlayContent {
 
 class Overlay {
  public:
-  // Sizes the text for a picture of this height.
+  // `height`: of the picture (pixels). It determines the size of the text.
   explicit Overlay(int height);
   Overlay(const Overlay&) = delete;
   Overlay& operator=(const Overlay&) = delete;

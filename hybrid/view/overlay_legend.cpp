@@ -10,10 +10,9 @@ namespace {
 
 constexpr float kLine = 1.6F;       // row pitch (em)
 constexpr float kMargin = 0.6F;     // between the parts of the column (em)
-constexpr float kLeastRows = 6.0F;  // of the legend, even where they cover what is below
+constexpr float kLeastRows = 6.0F;  // least rows of the legend, even if they cover the parts below
 
-// Column widths of the legend (pixels). They do not depend on what is felt, so that nothing moves in a
-// window.
+// Column widths of the legend (pixels). They do not depend on the forces, so that nothing jumps in a window.
 struct Columns {
   float name = 0.0F, kind = 0.0F, force = 0.0F, width = 0.0F;
 };

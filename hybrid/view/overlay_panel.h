@@ -17,9 +17,9 @@ class OverlayPanel {
   OverlayPanel& operator=(OverlayPanel&&) = delete;
   virtual ~OverlayPanel() = default;
 
-  // Before ImGui's NewFrame(): hands pointer and keys over.
+  // Call before ImGui's NewFrame(). Gives ImGui the pointer and the keys.
   virtual void take_input() = 0;
-  // Between NewFrame() and Render().
+  // Call between NewFrame() and Render().
   virtual void draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                     const PixelRect& where) = 0;
 };

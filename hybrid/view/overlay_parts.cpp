@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr float kHairline = 1.0F;  // pixels: what points at the scene without covering it
+constexpr float kHairline = 1.0F;  // pixels; thin, so that it covers little of the scene
 
 }  // namespace
 
@@ -23,7 +23,7 @@ void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   const float x = em;
   float y = 0.8F * em;
   std::string title = scene.title.empty() ? "untitled scene" : scene.title;
-  // The head font is twice the body's, and fit() measures with the body's.
+  // The title's font is twice as large as the body's, with which fit() measures.
   title = pen.fit(title, (static_cast<float>(content.width) - 2.0F * em) / 2.0F);
   pen.text(x, y, pen.inks.text, title, true);
   y += 2.2F * em;
@@ -41,7 +41,7 @@ void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m) {
   pen.text(x0 + 0.8F * em, y0 + 0.5F * em, pen.inks.text, "tissue moved by");
   const float left = x0 + 0.8F * em, right = x0 + w - 0.8F * em;
   const float top = y0 + 2.0F * em, bottom = top + 0.9F * em;
-  // What hardly moved has its own colour: paper stands for it.
+  // Tissue that hardly moved keeps its own colour. The scale shows white in its place.
   const glm::vec3 paper(1.0F);
   for (int s = 0; s < steps; ++s) {
     const float a = static_cast<float>(s) / steps, b = static_cast<float>(s + 1) / steps;
@@ -84,8 +84,7 @@ void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& s
   const std::string words = force_text(force);
   const float most_x = static_cast<float>(where.width) - pen.width(words) - 0.6F * pen.em;
   const float most_y = static_cast<float>(where.height) - 2.0F * pen.em;
-  // For an arrow that points left, the label goes to the left of the tip: on the right it would cover the
-  // arrow.
+  // If the arrow points left, the label is to the left of the tip: on the right it would cover the arrow.
   const auto base = camera.pixel(snapshot.proxy_m, where.width, where.height);
   const bool left = base && base->x - tip->x > 0.5 * std::abs(base->y - tip->y);
   const float aside = left ? -0.8F * pen.em - pen.width(words) : 0.8F * pen.em;
@@ -117,7 +116,7 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
 }
 
 void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where) {
-  constexpr float line = 1.35F, margin = 0.8F, share = 0.62F;  // (em); of the scene's width, at most
+  constexpr float line = 1.35F, margin = 0.8F, share = 0.62F;  // em; em; most width as a share of the scene's
   const float em = pen.em;
   const std::vector<std::string> lines = pen.wrap(words, share * static_cast<float>(where.width));
   float widest = 0.0F;

@@ -10,19 +10,19 @@ namespace hybrid {
 
 void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                   const OverlayContent& content);
-// Draws a bar of a round length, at the depth of the view's target.
+// Draws a bar of a round length. The length holds at the depth of the view's target.
 void draw_scale_bar(const Pen& pen, const Camera& camera, const PixelRect& where);
-// The inset's frame, and a ring and a line that say where it is in the scene.
+// Draws the inset's frame, and a ring and a line that show its place in the scene.
 void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayContent& content);
-// The size of the force, beside the arrow's tip; nothing without an arrow.
+// Draws the size of the force beside the arrow's tip. Draws nothing without an arrow.
 void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
                       const PixelRect& where);
 
-// A message at the head of the scene, in as many lines as it needs.
+// Draws a message at the top of the scene, in as many lines as it needs.
 void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where);
 
-// The column beside the scene: the legend, below it the colours of displacement, above the inset. What has no
-// room is left out, and rows of the legend are counted.
+// Draws the column beside the scene: the legend, below it the colours of displacement, and above the inset.
+// Parts without room are left out. Legend rows without room are counted.
 void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                  const OverlayContent& content);
 void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m);

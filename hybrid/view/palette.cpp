@@ -13,9 +13,9 @@
 namespace hybrid::palette {
 namespace {
 
-constexpr float kAlike = 0.25F;  // nearer colours are not told apart at a glance
+constexpr float kAlike = 0.25F;  // colours at a smaller distance look alike at a glance
 
-// The customary colour of a known tissue. A frame asks for the same names again, so answers are kept.
+// The customary colour of a known tissue. Results are kept, because every frame asks for the same names.
 std::optional<glm::vec3> customary(const std::string& name) {
   thread_local std::map<std::string, std::optional<glm::vec3>> known;
   const auto [at, fresh] = known.try_emplace(name);
@@ -30,7 +30,7 @@ std::optional<glm::vec3> customary(const DrawnObject& object) {
   return by_name ? by_name : customary(object.material);
 }
 
-// Colours for materials without a customary one: unlike the colours that the scene has already.
+// Colours for materials without a customary one. They differ from the colours that the scene already has.
 std::vector<glm::vec3> free_for_materials(const DrawnScene& scene) {
   std::vector<glm::vec3> free(material.begin(), material.end());
   const auto take = [&](const glm::vec3& own) {
@@ -78,7 +78,8 @@ std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index) {
   const DrawnObject& object = scene.objects[index];
   const std::vector<glm::vec3> visible = of_materials(scene, index);
   const std::vector<glm::vec3> free = free_for_materials(scene);
-  std::size_t hidden = 0;  // without a customary colour; the last free colours are theirs
+  // Hidden materials without a customary colour; they get the free colours from the end.
+  std::size_t hidden = 0;
   std::vector<glm::vec3> colours;
   for (const std::string& name : object.inside.materials) {
     const auto at =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The colours of pictures, window and legend. One table serves all three, so that they agree. Objects differ
-// in hue and in lightness, so that colour-blind readers can tell them apart (after Okabe & Ito 2008).
+// The colours of pictures, window and legend, in one table, so that all three agree. Objects differ in hue
+// and in lightness, so that colour-blind readers can tell them apart (after Okabe & Ito 2008).
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace hybrid::palette {
 
-// sRGB, 0 to 1.
+// All colours are sRGB, 0 to 1.
 inline constexpr glm::vec3 background{0.945F, 0.953F, 0.962F};
 inline constexpr glm::vec3 dark_background{0.118F, 0.129F, 0.149F};
 inline constexpr glm::vec3 tool{0.13F, 0.17F, 0.24F};
@@ -20,9 +20,10 @@ inline constexpr glm::vec3 dark_tool{0.66F, 0.71F, 0.79F};  // on the dark backg
 inline constexpr glm::vec3 device{0.10F, 0.45F, 0.85F};
 inline constexpr glm::vec3 force{0.03F, 0.38F, 0.93F};
 
-// The scale of displacement, from 0 to its end: viridis (Smith & van der Walt 2015), in which equal steps
-// look equal, to colour-blind readers too, and which gets lighter from end to end. What hardly moved keeps
-// its own colour: the share of the scale up to which it is the only one, and the share from which it is gone.
+// The scale of displacement, from 0 to its end: viridis (Smith & van der Walt 2015). In viridis equal steps
+// look equal, to colour-blind readers too, and the lightness rises from end to end. Tissue that hardly moved
+// keeps its own colour. Below the share kOwnUntil of the scale there is only the own colour, and from
+// kRampFrom on only viridis.
 inline constexpr std::array<glm::vec3, 9> moved{{{0.267F, 0.005F, 0.329F},
                                                  {0.283F, 0.141F, 0.458F},
                                                  {0.229F, 0.322F, 0.546F},
@@ -43,10 +44,10 @@ inline constexpr std::array<glm::vec3, 6> soft{{{0.86F, 0.58F, 0.62F},
                                                 {0.36F, 0.62F, 0.85F},
                                                 {0.75F, 0.48F, 0.72F}}};
 
-// Colours of the materials of one object. A search in Oklab maximised the least distance between any two, for
-// normal vision and for vision without the first or the second cone type (Machado et al. 2009), and the
-// distance to the colours above. Each differs from every other in hue or in lightness. The first colours are
-// furthest from each other.
+// Colours of the materials of one object. A search in Oklab maximised the least distance between any two
+// colours, and their distance to the colours above. It did so for normal vision and for vision without the
+// first or the second cone type (Machado et al. 2009). Each colour differs from every other in hue or in
+// lightness. The first colours are furthest from each other.
 inline constexpr std::array<glm::vec3, 10> material{{{0.86F, 0.57F, 0.57F},
                                                      {0.54F, 0.71F, 0.96F},
                                                      {0.74F, 0.90F, 0.56F},
@@ -60,26 +61,27 @@ inline constexpr std::array<glm::vec3, 10> material{{{0.86F, 0.57F, 0.57F},
 // All materials beyond these share one neutral colour, so that no colour stands for two materials.
 inline constexpr glm::vec3 other_material{0.50F, 0.50F, 0.50F};
 
-// However many colours the scene has already, so many stay for materials.
+// At least so many colours stay for materials, however many colours the scene already has.
 inline constexpr std::size_t kLeastFree = 5;
 
-// Colour of object `index`: the customary one if its name, or that of its material, is in the table of
-// tissues (hybrid/scene/tissue_table.h); else the n-th such rigid (or soft) object has the n-th colour of its
-// kind.
+// Colour of object `index`. It is the customary one if the object's name, or that of its material, is in the
+// table of tissues (hybrid/scene/tissue_table.h). Otherwise the n-th such rigid (or soft) object gets the
+// n-th colour of its kind.
 glm::vec3 of_object(const DrawnScene& scene, std::size_t index);
 
-// Colours of an object's materials, in their order; the object's own colour if it has none. A material has
-// one colour in the whole scene: the customary one, or one that is assigned by name, object after object.
+// Colours of an object's materials, in their order; the object's own colour if it has no materials. A
+// material has one colour in the whole scene: the customary one, or one that is assigned by name, object
+// after object.
 std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index);
 
-// Colours of the materials within an object (DrawnInside::materials), also of those that its surface hides.
+// Colours of all materials within an object (DrawnInside::materials), including those that the surface hides.
 std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index);
 
-// End of the scale for a largest motion: 1, 2 or 5 · 10^n, at or above it.
+// End of the scale for a largest displacement: the next 1, 2 or 5 · 10^n at or above it (m).
 double scale_end(double moved_m);
 
-// Colour of a point that moved by `share` (0 to 1) of the scale's end, on an object of colour `own`. The
-// renderer's shader computes the same formula.
+// Colour of a point on an object of colour `own`. The point's displacement is `share` (0 to 1) of the scale's
+// end. The renderer's shader has the same formula.
 glm::vec3 of_displacement(const glm::vec3& own, float share);
 
 }  // namespace hybrid::palette

@@ -35,7 +35,7 @@ EGLDisplay initialised(EGLDisplay display) {
 }
 
 EGLDisplay open_display() {
-  // libepoxy ends the program when these libraries are missing, so they are looked for first.
+  // libepoxy ends the program if these libraries are missing, so check first.
   if (!library_exists("libEGL.so.1"))
     throw std::runtime_error(std::string("libEGL.so.1 is not here") + remedy);
   if (!library_exists("libOpenGL.so.0") && !library_exists("libGL.so.1")) {
@@ -51,7 +51,7 @@ EGLDisplay open_display() {
   }
   if (display == EGL_NO_DISPLAY && has("EGL_EXT_platform_base") && has("EGL_EXT_platform_device") &&
       has("EGL_EXT_device_enumeration")) {
-    // A vendor's driver without Mesa: take its first device.
+    // A vendor's driver without Mesa: take the first device.
     EGLDeviceEXT device = nullptr;
     EGLint count = 0;
     if (eglQueryDevicesEXT(1, &device, &count) == EGL_TRUE && count > 0) {
@@ -68,8 +68,8 @@ EGLDisplay open_display() {
 class OffscreenContext {
  public:
   OffscreenContext() {
-    // Opened once and never closed: the driver stays loaded, and the next picture starts without delay. A
-    // failure is tried again.
+    // The display is opened once and never closed. So the driver stays loaded, and the next picture starts
+    // without delay. If opening fails, the next picture tries again.
     static const EGLDisplay opened = open_display();
     display_ = opened;
     if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A picture of a session without a display: an EGL context without a surface. On a machine without a graphics
-// card, Mesa draws in software.
+// Pictures of a session without a display, by an EGL context without a surface. On a machine without a
+// graphics card, Mesa draws in software.
 #pragma once
 
 #include <filesystem>
@@ -23,8 +23,8 @@ struct PictureOptions {
 void save_picture(const std::filesystem::path& png, const DrawnScene& scene, const Snapshot& snapshot,
                   const PictureOptions& options = {});
 
-// The same for many snapshots of one scene: surfaces are uploaded once. Keeps a reference to the scene. The
-// context is current on the thread that made it, and only that thread may call save().
+// Saves many snapshots of one scene; surfaces are uploaded only once. Keeps a reference to the scene. The
+// context is current on the thread that made this object, and only that thread may call save().
 class PictureMaker {
  public:
   explicit PictureMaker(const DrawnScene& scene, int height = PictureOptions{}.height);

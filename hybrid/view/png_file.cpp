@@ -16,7 +16,7 @@ void save_png(const std::filesystem::path& file, int width, int height, std::spa
     throw std::invalid_argument("save_png: the pixels do not match the size");
   }
   WholeFile out(file);
-  // The simplified interface reports errors by value: no longjmp across C++ frames.
+  // The simplified interface returns errors as values, so no longjmp crosses C++ frames.
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(width);

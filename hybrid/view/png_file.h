@@ -8,9 +8,9 @@
 
 namespace hybrid {
 
-// `rgb`: rows from the top, three bytes (RGB) a pixel, 3·width·height in all. Throws std::runtime_error: not
-// writable, disk full. A file that is not finished leaves what was there. Throws std::invalid_argument when
-// the number of pixels does not match the size.
+// Writes the whole file or, on an error, leaves an existing one as it was. `rgb`: rows from the top, three
+// bytes (RGB) a pixel, 3·width·height in all. Throws std::runtime_error: not writable, disk full. Throws
+// std::invalid_argument if the number of bytes does not match the size.
 void save_png(const std::filesystem::path& file, int width, int height, std::span<const std::uint8_t> rgb);
 
 }  // namespace hybrid

@@ -26,23 +26,23 @@ namespace {
 
 struct Object {
   GlMesh mesh;
-  DrawMesh moving;  // kept for a soft object only
+  DrawMesh moving;  // used by soft objects only
   bool soft = false;
   glm::vec3 colour{1.0F};
   SceneBounds bounds;                      // at rest
-  glm::mat4 placed{1.0F};                  // from the uploaded pose to the present pose
-  GlMesh face;                             // of a cut, in the present view; empty: whole
-  glm::vec4 kept{0.0F, 0.0F, 0.0F, 1.0F};  // plane of the cut: what is drawn lies on its positive side
+  glm::mat4 placed{1.0F};                  // from the uploaded pose to the present one
+  GlMesh face;                             // face of a cut in the present view; empty: no cut
+  glm::vec4 kept{0.0F, 0.0F, 0.0F, 1.0F};  // plane of the cut: the part on its positive side is drawn
 };
 
 constexpr int most_pixels = 8192;
-constexpr double kDepthApart = 5e-4;  // of the view's height: about half a pixel
+constexpr double kDepthApart = 5e-4;  // share of the view's height: about half a pixel
 
 }  // namespace
 
 struct Renderer::State {
   GLuint mesh_program = 0, depth_program = 0;
-  GLuint program = 0;  // in use: the mesh's or the depth's
+  GLuint program = 0;  // the program in use: mesh_program or depth_program
   std::vector<Object> objects;
   GlMesh ball, cylinder, cone, disc;
   GlOverlay overlay;
@@ -52,7 +52,7 @@ struct Renderer::State {
   GLuint final_frame = 0, final_colour = 0;
   int width = 0, height = 0, factor = 1, wanted_factor = 1, built_width = 0, built_height = 0;
   SceneBounds bounds;        // at rest
-  glm::dvec3 origin_m{0.0};  // uploaded floats are relative to this point
+  glm::dvec3 origin_m{0.0};  // uploaded positions are floats relative to this point
   double most_moved_m = 0.0;
 
   void use(GLuint which, const glm::mat4& clip) {
@@ -109,7 +109,7 @@ void Renderer::State::build_targets() {
   built_height = h;
 }
 
-// Opaque objects of one kind.
+// Draws the opaque objects that are soft, or those that are rigid.
 void Renderer::State::draw_objects(bool soft, int pass) const {
   uniform("pass", pass);
   for (std::size_t i = 0; i < objects.size(); ++i) {
@@ -137,19 +137,19 @@ void Renderer::State::draw_object(const Object& object, float alpha) const {
   object.mesh.draw();
   glDisable(GL_CLIP_DISTANCE0);
   if (object.face.count > 0) {
-    // The face lies in the plane: rounding must not clip it.
+    // The face lies in the cut's plane, so rounding could clip it. Use a plane that keeps all.
     uniform("kept", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
     uniform("coloured_vertices", 1);
     uniform("moved_scale", 0.0F);
     object.face.draw();
   }
   glDisable(GL_CLIP_DISTANCE1);
-  // Some drivers clip by a plane that is switched off: tool and arrow are always whole.
+  // Some drivers clip even when clipping is switched off. This plane keeps tool and arrow whole.
   uniform("clip_plane", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
 }
 
-// Of translucent objects only the nearest surface is blended: a depth-only pass finds it first, so that no
-// order of triangles matters.
+// Of translucent objects only the nearest surface is blended. A depth-only pass finds it first, so the order
+// of the triangles does not matter.
 void Renderer::State::draw_translucent(const glm::mat4& clip) {
   const auto draw_all = [this] {
     uniform("nearer", 0.0F);
@@ -234,7 +234,7 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   check_gl("uploading the scene");
 }
 
-// Destroying the context (owned by picture or window) frees every OpenGL object that is left.
+// The context is owned by the picture or the window. When it ends, it frees every OpenGL object that is left.
 Renderer::~Renderer() = default;
 
 void Renderer::release() {
@@ -283,8 +283,8 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
       continue;
     const double moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
     object.mesh.stream(object.moving);
-    // Motion below a thousandth of the tool's radius does not start a scale: rounding must not show as a
-    // pattern.
+    // Displacements below a thousandth of the tool's radius do not start a scale, so that rounding does not
+    // show as a pattern.
     const double least = 1e-3 * scene.tool_radius_m;
     if (moved > std::max(s.most_moved_m, least)) s.most_moved_m = palette::scale_end(moved);
   }
@@ -316,8 +316,8 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
                                               s.bounds.centre_m, radius));
   s.cut_objects(scene, snapshot, camera);
   const glm::vec3 eye(camera.eye_m() - s.origin_m);
-  // Surfaces that lie on one another have one depth, and rounding would choose pixel by pixel: a rigid one
-  // is drawn nearer than tissue by this length, and hides tissue only if it is nearer still.
+  // Where surfaces coincide, rounding would choose between them pixel by pixel. So a rigid surface is drawn
+  // nearer than tissue by this length. It hides tissue only if it is still nearer than that.
   const auto apart = static_cast<float>(kDepthApart * camera.view_height_m());
   s.use(s.mesh_program, clip);
   s.uniform("eye", eye);
@@ -338,8 +338,8 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glDepthFunc(GL_LEQUAL);
   glDepthMask(GL_TRUE);
 
-  // Depth of the things that must not be hidden: soft objects, the arrow, and a disc a little larger than the
-  // tool.
+  // Draws the depth of all that must not be hidden: soft objects, the arrow, and a disc a little larger than
+  // the tool.
   s.use(s.depth_program, clip);
   s.uniform("eye", eye);
   glBindFramebuffer(GL_FRAMEBUFFER, s.shown_frame);
@@ -373,7 +373,7 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   s.uniform("nearer", 0.0F);
 
   glEnable(GL_BLEND);
-  glEnable(GL_CULL_FACE);  // closed transparent shapes would otherwise be blended twice
+  glEnable(GL_CULL_FACE);  // otherwise closed transparent shapes would be blended twice
   glDepthMask(GL_FALSE);
   if (tool_known) {
     glDepthFunc(GL_GREATER);
@@ -381,7 +381,7 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     glDepthFunc(GL_LEQUAL);
     const bool device_is_off = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
     if (device_is_off && polygon::is_finite(snapshot.device_m)) {
-      glDepthFunc(GL_ALWAYS);  // the device point lies inside an object
+      glDepthFunc(GL_ALWAYS);  // draw always: the device point lies inside an object
       s.uniform("pass", 3);
       s.uniform("own_colour", palette::device);
       s.draw_tool(scene, snapshot.device_m);
@@ -390,7 +390,8 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     }
   }
   glDisable(GL_CULL_FACE);
-  // Rigid surfaces in front of those: only the nearest is blended; a depth-only pass finds it first.
+  // Rigid surfaces in front of soft objects and of the tool: only the nearest is blended. A depth-only pass
+  // finds it.
   glDepthMask(GL_TRUE);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   s.use(s.depth_program, clip);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Draws a scene and a snapshot with OpenGL 3.3. Picture and window use this one implementation; each brings
-// its own context, which must be current on the calling thread for every call here.
-// Hidden things: rigid objects are opaque, except in front of a soft object, the tool, or the neighbourhood
-// of the tool. There only their nearest surface is drawn, thin in the middle and dense at its rim. The tool
-// and the arrow show faintly through tissue.
+// Draws a scene and a snapshot with OpenGL 3.3. Pictures and windows both use it. Each has its own context,
+// which must be current on the calling thread for every call here. Hidden things: rigid objects are opaque,
+// except in front of a soft object, of the tool, or of the tool's neighbourhood. There only their nearest
+// surface is drawn, thin in the middle and dense at its rim. The tool and the arrow show faintly through
+// tissue.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,14 @@
 
 namespace hybrid {
 
-// Samples per pixel: always four (fine), or one if the context draws without a graphics card (fast).
+// Samples per pixel. fine: always four. fast: one if the context draws without a graphics card.
 enum class Samples : std::uint8_t { fine, fast };
 
 class Renderer {
  public:
-  // Uploads the static meshes. Throws std::runtime_error: context older than 3.3, out of memory, mesh too
-  // large for one draw call. Keeps no reference to the scene; later calls take it again.
+  // Uploads the static meshes. Throws std::runtime_error: the context is older than 3.3, there is too little
+  // memory, or a mesh is too large for one draw call. Keeps no reference to the scene: later calls take it
+  // again.
   explicit Renderer(const DrawnScene& scene, Samples samples);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
@@ -34,13 +35,14 @@ class Renderer {
   ~Renderer();
 
   void set_font(const FontAtlas& atlas);
-  // Frees what was made in the context, which goes on with another renderer. This one draws no more.
+  // Frees all its objects in the context, which another renderer may go on to use. This one must not draw any
+  // more.
   void release();
 
-  // How the following frames show the scene.
+  // Sets how the following frames show the scene.
   void set_view(const ViewSettings& view);
-  // Starts a frame of this many pixels (1 to 8192 each; throws std::runtime_error otherwise) and uploads the
-  // snapshot's moving vertices. `scene` must be the scene that the renderer was made from.
+  // Starts a frame and uploads the snapshot's moving vertices. Width and height are 1 to 8192 pixels;
+  // otherwise throws std::runtime_error. `scene` must be the scene that the renderer was made from.
   void begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height);
   // Draws the scene into a part of the frame, over its content.
   void draw(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const PixelRect& where);
@@ -52,8 +54,8 @@ class Renderer {
   // Returns the finished frame: rows from the top, three bytes (RGB) a pixel.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb();
 
-  // Displacement at the end of the colour scale (unit: meter): a round number that never falls, so that
-  // colours keep their meaning from frame to frame.
+  // Displacement at the end of the colour scale (m). It is a round number that never falls, so that colours
+  // keep their meaning from frame to frame.
   [[nodiscard]] double displacement_scale_m() const;
 
  private:

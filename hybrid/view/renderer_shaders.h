@@ -33,9 +33,8 @@ void main() {
 }
 )";
 
-// pass 0: lit, opaque or with one alpha. pass 1: rigid, only in pixels without a soft object or tool behind.
-// pass 2: rigid, only in the other pixels: dense at the rim, thin in the part that faces the eye. pass 3:
-// like glass.
+// Passes. 0: lit; opaque, or with one alpha. 1: rigid, only in pixels where it hides no soft object and no
+// tool. 2: rigid, only in the other pixels: dense at the rim, thin where it faces the eye. 3: like glass.
 inline constexpr const char* mesh_fragment = R"(#version 330 core
 in vec3 scene_position;
 in vec3 scene_normal;
@@ -103,7 +102,7 @@ void main() {
 }
 )";
 
-// Depth only, without lighting: all fragments (pass 0), or those of pass 2 above.
+// Depth only, without lighting: all fragments (pass 0), or the fragments of pass 2 of mesh_fragment.
 inline constexpr const char* depth_fragment = R"(#version 330 core
 uniform int pass;
 uniform sampler2D shown_depth;

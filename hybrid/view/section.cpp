@@ -12,8 +12,9 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSquaresPerVoxel = 3.0;  // along one edge, so that a border on a slant looks straight
-constexpr double kMostSquares = 300.0;    // along one edge of the face
+// Squares along a voxel's edge, so that slanted borders look straight.
+constexpr double kSquaresPerVoxel = 3.0;
+constexpr double kMostSquares = 300.0;  // squares along an edge of the face at most
 
 VertexColour bytes_of(const glm::vec3& colour) {
   const glm::vec3 byte = glm::round(255.0F * colour);
@@ -34,7 +35,7 @@ std::optional<Cut> choose_cut(const DrawnScene& scene, const Snapshot& snapshot,
       force > 0.0 && std::isfinite(force) ? snapshot.force_N / force : glm::dvec3(0.0, 0.0, 1.0);
   const glm::dvec3 toward = camera.toward_eye();
   const glm::dvec3 across = toward - glm::dot(toward, along) * along;
-  // A camera that looks along the force sees any plane along it from the edge.
+  // If the camera looks along the force, it sees every plane along the force edge-on.
   if (!(glm::length(across) > 0.1)) return {};
   return Cut{snapshot.proxy_m, glm::normalize(across)};
 }
@@ -72,7 +73,7 @@ SectionMesh make_section(const DrawnScene& scene, const Snapshot& snapshot, std:
       const auto first = static_cast<std::uint32_t>(section.mesh.vertices.size());
       for (int corner = 0; corner < 4; ++corner) {
         const glm::dvec3 rest = at_rest(i + (corner & 1), j + (corner >> 1));
-        // What moved out of the plane is drawn in it: the face stays flat.
+        // Displacements are projected into the plane, so that the face stays flat.
         glm::dvec3 by(moved.at(rest));
         by -= glm::dot(by, cut.toward_eye) * cut.toward_eye;
         section.mesh.vertices.push_back({glm::vec3(rest + by - origin_m), glm::vec3(cut.toward_eye), 0.0F});

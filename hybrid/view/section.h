@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A cut through a soft object that hides one material inside another: the part towards the eye is left out,
-// and the face of the cut shows the materials. Knows no graphics library.
+// A cut through a soft object in which one material hides another. The part towards the eye is left out, and
+// the face of the cut shows the materials. Knows no graphics library.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -13,17 +13,17 @@
 
 namespace hybrid {
 
-// A plane through the tool, along the force. The side of `toward_eye` (unit) is left out.
+// A plane through the tool, along the force. The part on the side of `toward_eye` (unit vector) is left out.
 struct Cut {
   glm::dvec3 point_m{0.0}, toward_eye{0.0, 0.0, 1.0};
 };
 
-// Empty unless the tool presses the object, the object hides a material, and the snapshot has the
-// displacements within the object.
+// Chooses a cut if the tool presses the object, the object hides a material, and the snapshot has the
+// displacements within the object. Otherwise empty.
 std::optional<Cut> choose_cut(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
                               std::size_t object);
 
-// The face of the cut, as the tissue is at that moment.
+// The face of the cut, deformed as the tissue is in the snapshot.
 struct SectionMesh {
   DrawMesh mesh;
   std::vector<VertexColour> colours;  // one for each vertex

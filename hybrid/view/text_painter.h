@@ -21,7 +21,7 @@ constexpr Ink ink_of(std::uint32_t r, std::uint32_t g, std::uint32_t b, std::uin
 }
 Ink ink_of(const glm::vec3& colour, float alpha = 1.0F);  // sRGB, 0 to 1
 
-// Colours of text and plates, on a light and on a dark background.
+// Colours of text and plates. There is one set for a light background and one for a dark one.
 struct Inks {
   Ink text, pale, paper, edge, force;
 };
@@ -47,9 +47,9 @@ struct Pen {
              float thick = 1.0F) const;
   void line(const glm::vec2& from, const glm::vec2& to, Ink ink, float thick = 1.0F) const;
   void circle(const glm::vec2& centre, float radius, Ink ink, float thick) const;
-  // Shortens text at the end to at most `most` pixels; cuts between UTF-8 characters.
+  // Shortens text to at most `most` pixels by cutting its end, between UTF-8 characters.
   [[nodiscard]] std::string fit(std::string words, float most) const;
-  // Lines of at most `most` pixels, broken at spaces and at line ends; a longer word is shortened.
+  // Breaks text into lines of at most `most` pixels, at spaces and line ends. A longer word is shortened.
   [[nodiscard]] std::vector<std::string> wrap(const std::string& words, float most) const;
 };
 

@@ -30,7 +30,7 @@ glm::dvec3 arrow_tip(const DrawnScene& scene, const Snapshot& snapshot, const Ca
   if (!(force > 1e-3) || !std::isfinite(force)) return snapshot.proxy_m;
   const double full = scene.max_force_N > 0.0 ? scene.max_force_N : force;
   const double length = arrow_share_of_view * camera.view_height_m() * std::min(force / full, 1.0);
-  // The part within the tool is hidden: the arrow's length counts from the tool's surface.
+  // The tool hides the part of the arrow within it, so that part does not count as length.
   const glm::dvec3 along = snapshot.force_N / force;
   double inside = scene.tool_radius_m;
   if (scene.tool_is_punch) {
@@ -47,7 +47,7 @@ ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, co
   const glm::dvec3 along = arrow_tip(scene, snapshot, camera) - snapshot.proxy_m;
   const double length = glm::length(along);
   if (!(length > 0.0) || !std::isfinite(length)) return arrow;
-  // Thinner than the tool, but never too thin to be seen.
+  // The shaft is thinner than the tool, but thick enough to be seen.
   const double thick =
       std::clamp(0.4 * scene.tool_radius_m, 0.0035 * camera.view_height_m(), 0.007 * camera.view_height_m());
   const double head = std::min(0.5 * length, 5.0 * thick);

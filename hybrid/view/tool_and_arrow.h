@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Placements of the unit shapes of unit_shapes.h for the tool and the force arrow, and of moving rigid
-// objects.
+// Places the unit shapes of unit_shapes.h: the tool, the force arrow, and moving rigid objects.
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -11,12 +10,12 @@
 
 namespace hybrid {
 
-// Length of the force arrow as a share of the view's height at max_force_N (the scene's limit; without one,
-// the present force).
+// Length of the force arrow at max_force_N, as a share of the view's height. max_force_N is the scene's limit
+// or, without one, the present force.
 inline constexpr double arrow_share_of_view = 0.30;
 
-// Tip of the arrow (scene frame, meters); the proxy when there is no force. The arrow starts at the proxy.
-// Its length counts from the tool's surface, because the part within the tool is hidden.
+// Tip of the arrow (scene's frame, meters); the proxy when there is no force. The arrow starts at the proxy.
+// Its length counts from the tool's surface, because the tool hides the part within it.
 glm::dvec3 arrow_tip(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera);
 
 // Transforms of the unit cylinder and the unit cone to the arrow, relative to `origin_m`.
@@ -28,11 +27,11 @@ ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, co
                            const glm::dvec3& origin_m);
 
 // Transform of the unit ball (for a punch: the unit cylinder) to the tool. The lower face of a flat punch is
-// the disc about `at_m`; its body stands above, along scene +z.
+// the disc about `at_m`. Its body is above, along the scene's +z.
 glm::mat4 place_tool(const DrawnScene& scene, const glm::dvec3& at_m, const glm::dvec3& origin_m);
 
-// Transform of a rigid object from its rest pose to its pose in the snapshot, relative to `origin_m`;
-// composed in doubles.
+// Transform of a rigid object from its rest pose to its pose in the snapshot, relative to `origin_m`. It is
+// computed in doubles.
 glm::mat4 place_rigid(const RigidPlace& place, const glm::dvec3& origin_m);
 
 // Transform of the unit disc to a disc about the tool that faces the camera and is a little larger than the

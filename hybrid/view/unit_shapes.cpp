@@ -25,8 +25,8 @@ glm::vec3 unit_or_zero(const glm::vec3& v) {
   return length > 0.0F && std::isfinite(length) ? v / length : glm::vec3(0.0F);
 }
 
-// Area-weighted normals of shared vertices. Areas are in units of the mesh's own size: the area of a
-// micrometer-wide triangle would leave the range of floats.
+// Computes area-weighted normals of shared vertices, in a form that does not leave the range of floats for
+// triangles of micrometers.
 void set_shared_normals(DrawMesh& draw) {
   for (DrawVertex& vertex : draw.vertices) vertex.normal = glm::vec3(0.0F);
   for (std::size_t t = 0; t + 2 < draw.indices.size(); t += 3) {
@@ -36,8 +36,7 @@ void set_shared_normals(DrawMesh& draw) {
     const glm::vec3 u = b.position - a.position;
     const glm::vec3 v = c.position - a.position;
     const float size = std::max(std::max(glm::length(u), glm::length(v)), 1e-30F);
-    // The weight is area over longest edge: it keeps exponents small. (The square root of the area would also
-    // do.)
+    // The weight is the area over the longest edge. Its exponent stays small.
     const glm::vec3 normal = glm::cross(u / size, v / size) * size;
     a.normal += normal;
     b.normal += normal;
@@ -61,20 +60,20 @@ DrawMesh shared_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin
   return draw;
 }
 
-// Every triangle gets three vertices of its own. A corner's normal is the mean over those neighbours whose
-// normal differs by less than the crease angle.
+// Gives every triangle three vertices of its own. The normal at a corner is the mean over those triangles at
+// the vertex whose normals differ by less than the crease angle.
 DrawMesh creased_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m) {
   constexpr double crease = 40.0 * std::numbers::pi / 180.0;
   const double cos_crease = std::cos(crease);
   std::vector<polygon::TriangleIndices> kept;
-  std::vector<glm::dvec3> area;  // face normals, length twice the area
+  std::vector<glm::dvec3> area;  // face normals whose length is twice the area
   for (const polygon::TriangleIndices& corner : mesh.triangles) {
     if (!usable(mesh, corner)) continue;
     const glm::dvec3& a = mesh.vertices[corner[0]];
     kept.push_back(corner);
     area.push_back(glm::cross(mesh.vertices[corner[1]] - a, mesh.vertices[corner[2]] - a));
   }
-  // Triangles around each vertex, as one array with offsets.
+  // The triangles around each vertex, as one array with offsets.
   std::vector<std::uint32_t> begin(mesh.vertices.size() + 1, 0);
   for (const auto& corner : kept) {
     for (const std::uint32_t v : corner) ++begin[v + 1];
@@ -88,8 +87,8 @@ DrawMesh creased_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origi
   DrawMesh draw;
   draw.vertices.reserve(3 * kept.size());
   draw.indices.reserve(3 * kept.size());
-  // Bounds the cost for a vertex that very many triangles share (worst case of a triangle soup), which would
-  // be quadratic.
+  // Most triangles that count around a vertex. Without a limit the cost would be quadratic in the triangles
+  // that share a vertex, which may be all of them.
   constexpr std::uint32_t at_most = 64;
   for (std::size_t t = 0; t < kept.size(); ++t) {
     const double own = glm::length(area[t]);
@@ -113,8 +112,8 @@ DrawMesh creased_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origi
 
 constexpr std::uint32_t sides = 48;
 
-// Rings of `sides` vertices about z, joined in order. Each ring has a radius, a height and a normal (radial,
-// axial).
+// A shape from rings of `sides` vertices about z, joined in order. Each ring has a radius, a height and a
+// normal (radial, axial).
 struct Ring {
   float radius, z, normal_radial, normal_z;
 };

@@ -17,7 +17,7 @@ namespace hybrid {
 
 struct DrawVertex {
   glm::vec3 position{0.0F};     // relative to the mesh's origin (unit: meter)
-  glm::vec3 normal{0.0F};       // unit; zero if undefined (degenerate or inconsistently oriented)
+  glm::vec3 normal{0.0F};       // unit vector; zero if undefined (degenerate or inconsistently oriented)
   float displacement_m = 0.0F;  // from rest; 0 for a rigid object
 };
 static_assert(sizeof(DrawVertex) == 28, "uploaded as it stands");
@@ -27,12 +27,13 @@ struct DrawMesh {
   std::vector<std::uint32_t> indices;  // three per triangle, all in range
 };
 
-// A surface that never moves. Meshes of up to 30,000 triangles get their sharp edges split, so that edges
-// look sharp. Larger ones share normals: their triangles are smaller than the eye resolves. Triangles with an
+// Mesh of a surface that never moves. With up to 30,000 triangles, sharp edges are split, so that they look
+// sharp. Larger meshes share normals, because the eye does not resolve their triangles. Triangles with an
 // index out of range or a vertex that is not finite are left out.
 DrawMesh make_draw_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m);
 
-// One vertex per mesh vertex, in the mesh's order, as move_vertices() needs it.
+// Mesh of a surface that moves. It has one vertex per mesh vertex, in the mesh's order, as move_vertices()
+// needs.
 DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m);
 
 // Colours (sRGB) of the materials at an object's vertices, in the mesh's order; empty if the object has one
@@ -40,13 +41,13 @@ DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& o
 using VertexColour = std::array<std::uint8_t, 4>;
 std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index);
 
-// Moves the vertices of a moving mesh to `moved_m` (meters) from rest and updates normals and displacements.
-// Vertices whose displacement is not finite stay at rest. Returns the largest displacement (unit: meter).
-// `moved_m` must have as many entries as `rest`.
+// Moves the vertices of a moving mesh by `moved_m` (meters) from rest, and updates normals and displacements.
+// Vertices whose displacement is not finite stay at rest. Returns the largest displacement (m). `moved_m`
+// must have as many entries as `rest`.
 float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> moved_m,
                     const glm::dvec3& origin_m);
 
-// Shapes of unit size for tool and arrow, normals outward.
+// Shapes of unit size for tool and arrow. Their normals point outwards.
 DrawMesh make_unit_ball();      // radius 1 about the origin
 DrawMesh make_unit_cylinder();  // radius 1 about z, from z = 0 to z = 1, closed
 DrawMesh make_unit_cone();      // radius 1 at z = 0, tip at z = 1, closed

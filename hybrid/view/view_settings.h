@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a window shows its scene. Nothing in it changes what is felt.
+// Settings of the view in a window. None of them changes the forces.
 #pragma once
 
 #include <glm/vec4.hpp>
@@ -15,12 +15,12 @@ struct ObjectLook {
   float opacity = 1.0F;  // 0 to 1
 };
 
-// A plane across the scene, perpendicular to an axis. What lies beyond it along the axis is left out.
+// A plane across the scene, perpendicular to an axis. The part beyond the plane along the axis is left out.
 struct ClipPlane {
   bool on = false;
   int axis = 0;             // 0: x, 1: y, 2: z
-  double share = 0.5;       // place between the scene's lowest and highest point along the axis, 0 to 1
-  bool other_side = false;  // leaves out what lies before it instead
+  double share = 0.5;       // place along the axis within the scene's bounding ball, 0 to 1
+  bool other_side = false;  // the part before the plane is left out instead
 };
 
 struct ViewSettings {
@@ -34,10 +34,10 @@ struct ViewSettings {
   }
 };
 
-// Coefficients of the plane (relative to `origin_m`) whose positive side is drawn; empty: nothing is clipped.
+// Coefficients of the plane, relative to `origin_m`. Its positive side is drawn. Empty: nothing is clipped.
 [[nodiscard]] std::optional<glm::vec4> clip_equation(const ClipPlane& clip, const SceneBounds& bounds,
                                                      const glm::dvec3& origin_m);
-// The plane's place on its axis (m).
+// Coordinate of the plane along its axis (m).
 [[nodiscard]] double clip_place_m(const ClipPlane& clip, const SceneBounds& bounds);
 
 }  // namespace hybrid

@@ -10,23 +10,24 @@
 namespace hybrid {
 namespace {
 
-constexpr double kPeriod_us = 1000.0;  // of a servo loop at 1 kHz: the line in the chart of tick times
+constexpr double kPeriod_us = 1000.0;  // period of a servo loop at 1 kHz: the line in the chart of tick times
 
-// Colours of the series, apart in hue and in lightness (after Okabe & Ito 2008), on light and dark paper.
+// Colours of the series. They differ in hue and in lightness (after Okabe & Ito 2008), on light and dark
+// paper.
 constexpr std::array<glm::vec3, kForceSeries> kSeries{
     {{0.03F, 0.38F, 0.93F}, {0.84F, 0.37F, 0.00F}, {0.00F, 0.62F, 0.45F}}};
 constexpr std::array<const char*, kForceSeries> kSeriesNames{"total", "rigid", "soft"};
 
-// "85.2 µs", "1.23 ms"
+// For example "85.2 µs" or "1.23 ms".
 std::string tick_time_text(double us) {
   return us < kPeriod_us ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
 }
 
 struct ChartBox {
-  float left, right, top, bottom;  // of the plot (pixels)
+  float left, right, top, bottom;  // edges of the plot (pixels)
 };
 
-// The end of the axis: a round number at or above the maximum.
+// The end of the axis: a round number that is at least the maximum.
 double axis_end(double most) {
   if (!(most > 0.0)) return 1.0;
   double end = round_down(most);
@@ -45,13 +46,14 @@ void draw_keys(const Pen& pen, float right, float y) {
   }
 }
 
-// One vertical line for each column, from its least to its largest force, joined to the column before.
+// Draws one vertical line for each column, from the column's least to its largest force. Each line is joined
+// to that of the column before.
 void draw_series(const Pen& pen, const ChartBox& box, const TickHistory& history, ForceSeries series,
                  double top_N) {
   const auto count = static_cast<std::size_t>(std::max(box.right - box.left, 1.0F));
   const auto columns = history.columns(series, count);
   const Ink ink = ink_of(kSeries[static_cast<std::size_t>(series)]);
-  // Where a part is the whole force, its thin line lies within the thick one of the whole.
+  // If a part is the whole force, its thin line is drawn within the thick line of the total.
   const float half = series == ForceSeries::total ? 1.75F : 0.6F;
   const auto y_of = [&](float force_N) {
     const float share = std::clamp(force_N / static_cast<float>(top_N), 0.0F, 1.0F);
@@ -115,7 +117,7 @@ void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& ti
   const float bar = w / static_cast<float>(TickTimes::kBins);
   for (std::size_t b = 0; b < TickTimes::kBins; ++b) {
     if (times.bins[b] == 0) continue;
-    // The height is logarithmic, so that a single late tick among thousands is seen.
+    // The height is logarithmic, so that a single late tick among thousands is visible.
     const double share =
         std::log1p(static_cast<double>(times.bins[b])) / std::log1p(static_cast<double>(most));
     const float x = x0 + static_cast<float>(b) * bar;

@@ -14,7 +14,7 @@
 namespace hybrid {
 namespace {
 
-// ImGui asks for the keys that it knows by the numbers that the window uses: those of UiKey.
+// Maps the keys that ImGui knows to the numbers that the window uses, those of UiKey.
 void map_keys(ImGuiIO& io) {
   constexpr std::array<ImGuiKey, kUiKeys> keys{
       ImGuiKey_Tab,    ImGuiKey_LeftArrow, ImGuiKey_RightArrow, ImGuiKey_UpArrow, ImGuiKey_DownArrow,
@@ -69,7 +69,7 @@ void set_style(const Pen& pen, bool dark) {
   style.Colors[ImGuiCol_TextDisabled] = colour_of(pen.inks.pale);
   style.Colors[ImGuiCol_Border] = colour_of(pen.inks.edge, 0.7F);
   style.Colors[ImGuiCol_CheckMark] = colour_of(pen.inks.force);
-  // The value stands in the middle of a slider: it is read through the grab.
+  // The value is written in the middle of a slider, so the grab must be translucent.
   style.Colors[ImGuiCol_SliderGrab] = colour_of(pen.inks.force, 0.45F);
   style.Colors[ImGuiCol_SliderGrabActive] = colour_of(pen.inks.force, 0.7F);
   style.Colors[ImGuiCol_FrameBg] = colour_of(pen.inks.edge, 0.28F);
@@ -85,7 +85,7 @@ void set_style(const Pen& pen, bool dark) {
   style.Colors[ImGuiCol_NavHighlight] = colour_of(pen.inks.force);
 }
 
-// A row of buttons of equal width.
+// One button of a row of `of` buttons with equal widths. Returns whether it was pressed.
 bool wide_button(const char* words, int of, bool lit = false) {
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float width =
@@ -125,7 +125,7 @@ std::string words_of_value(EditedQuantity quantity) {
   return {};
 }
 
-// The chart's place in the panel; the cursor moves below it.
+// Reserves a place for a chart in the panel, and moves the cursor below it.
 PixelRect take_place(float height) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const float width = ImGui::GetContentRegionAvail().x;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The panel beside the scene in a window: session, objects and their values, view, and charts of force and
-// tick times. It draws with Dear ImGui and returns actions; it changes nothing itself.
+// tick times. It draws with Dear ImGui and returns actions. It changes nothing itself.
 #pragma once
 
 #include <string>
@@ -16,17 +16,17 @@
 
 namespace hybrid {
 
-// What the session tells its window beside snapshots.
+// Data that the session gives its window besides snapshots.
 struct SessionNotes {
   bool real_device = false;         // slow motion is not possible
   double recorded_s = 0.0;          // length of the recording so far
-  std::uint64_t refused_edits = 0;  // too many waited
-  std::uint64_t unseen_ticks = 0;   // ticks that the charts missed, because a frame took too long
-  std::string message{};            // the last thing that was done; empty: nothing
-  std::string error{};              // of the scene's file; empty: none
+  std::uint64_t refused_edits = 0;  // refused because too many edits waited
+  std::uint64_t unseen_ticks = 0;   // ticks missing in the charts because a frame took too long
+  std::string message{};            // result of the last action; empty: none
+  std::string error{};              // error in the scene's file; empty: none
 };
 
-// What the panel shows in one frame.
+// The data that the panel shows in one frame.
 struct PanelFrame {
   const ViewState& state;
   const TickHistory& history;
@@ -36,14 +36,14 @@ struct PanelFrame {
 
 struct PanelResult {
   std::vector<ViewAction> actions;
-  bool wants_text = false;  // a control takes typed text: keys are not shortcuts
+  bool wants_text = false;  // a control takes typed text, so keys are not shortcuts
 };
 
 class Panels final : public OverlayPanel {
  public:
-  // `frame` has to live until the frame is drawn; its input is taken once.
+  // Sets the data of the next frame. `frame` must live until that frame is drawn. Its input is read once.
   void show(const PanelFrame& frame) { frame_ = &frame; }
-  // What was asked for since the last call.
+  // The actions that the user asked for since the last call.
   [[nodiscard]] PanelResult take_result() { return std::exchange(result_, {}); }
 
   void take_input() override;
@@ -61,20 +61,22 @@ class Panels final : public OverlayPanel {
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
 
   const PanelFrame* frame_ = nullptr;
-  const DrawnScene* bounds_of_ = nullptr;  // the scene of bounds_, which takes a look at every vertex
+  // The scene of bounds_; kept, because the bounds need a look at every vertex.
+  const DrawnScene* bounds_of_ = nullptr;
   SceneBounds bounds_;
   PanelResult result_;
-  // The slider that is being moved, and its value as last asked for: the session answers a frame later.
+  // The slider that the user moves, and the value that was last asked for. The session answers a frame later.
   std::size_t moved_ = static_cast<std::size_t>(-1);
   float moved_to_ = 0.0F;
 };
 
 // ---- charts (panel_charts.cpp) ----
-// Force of the last seconds: for each pixel column a line from the least to the largest force in it.
+// Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in
+// it.
 void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history);
-// Tick times on a logarithmic axis, with the servo period as a line.
+// Draws tick times on a logarithmic axis, with a line at the servo period.
 void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& times);
-// The mean time of each stage as a bar.
+// Draws the mean time of each stage as a bar.
 void draw_stage_times(const Pen& pen, const PixelRect& where, const TickTimes& times);
 
 }  // namespace hybrid

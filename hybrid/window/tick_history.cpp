@@ -45,7 +45,8 @@ void TickHistory::add(const TickSample& sample) {
 std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series, std::size_t count) const {
   std::vector<std::optional<ColumnRange>> columns(count);
   if (count == 0) return columns;
-  // Columns are anchored in time, not at the newest tick, so that a spike keeps its column as it moves.
+  // Columns begin at whole multiples of step_s, not relative to the newest tick. So the ticks of a column
+  // stay together while the chart scrolls.
   const double step_s = seconds_ / static_cast<double>(count);
   const auto last = static_cast<std::int64_t>(std::floor(end_s() / step_s));
   for (const TickSample& sample : samples_) {

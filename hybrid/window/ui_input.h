@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pointer and keyboard of one frame, as the panels take them. Knows no graphics library.
+// Input of pointer and keyboard in one frame, for the panels. Knows no graphics library.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace hybrid {
 
-// Keys that panels understand; the window translates its own.
+// Keys that panels understand. The window translates its own keys to these.
 enum class UiKey : std::uint8_t {
   tab,
   left,
@@ -36,16 +36,16 @@ enum class UiKey : std::uint8_t {
 inline constexpr std::size_t kUiKeys = 21;
 
 struct UiInput {
-  float x = -1.0F, y = -1.0F;        // of the pointer (pixels of the frame)
+  float x = -1.0F, y = -1.0F;        // position of the pointer (pixels of the frame)
   std::array<bool, 3> buttons{};     // left, right, middle
   float wheel = 0.0F;                // turns since the last frame
-  std::array<bool, kUiKeys> keys{};  // [UiKey] held
+  std::array<bool, kUiKeys> keys{};  // [UiKey]; is it held?
   bool control = false, shift = false, alt = false;
-  std::u32string typed{};     // since the last frame
-  float dt_s = 1.0F / 60.0F;  // since the last frame
-  bool by_keyboard = false;   // the keyboard moves among the panels' controls
-  // Let go in this frame: they count as held until its end, so that a short press is not lost however slow
-  // the frames.
+  std::u32string typed{};     // characters since the last frame
+  float dt_s = 1.0F / 60.0F;  // time since the last frame
+  bool by_keyboard = false;   // keys move between the panels' controls and operate them
+  // Buttons and keys that were let go in this frame. They count as held until its end, so that a short press
+  // is not lost in slow frames.
   std::array<bool, 3> lifted_buttons{};
   std::array<bool, kUiKeys> lifted_keys{};
 
@@ -58,7 +58,7 @@ struct UiInput {
     if (pressed) keys[k] = true;
     lifted_keys[k] = !pressed;
   }
-  // The frame has been drawn.
+  // Call after the frame has been drawn.
   void end_frame() {
     for (std::size_t b = 0; b < buttons.size(); ++b) buttons[b] = buttons[b] && !lifted_buttons[b];
     for (std::size_t k = 0; k < kUiKeys; ++k) keys[k] = keys[k] && !lifted_keys[k];

@@ -14,20 +14,20 @@
 namespace hybrid {
 namespace {
 
-// The arguments of a command.
+// The kinds of arguments that a command has.
 enum class ScriptArguments : std::uint8_t {
   none,
-  number,     // one
-  on_or_off,  // or nothing: the other state
+  number,     // one number
+  on_or_off,  // "on", "off", or nothing, which means the other state
   object,
-  object_number,  // 0 to 1
-  edit,           // object, or "tool"; quantity; value in the unit of the panel
-  look,           // all, contact, x, y, z
-  clip,           // off, or an axis and a number
-  file,           // may be left out
+  object_number,  // an object, and a number from 0 to 1
+  edit,           // an object or "tool", a quantity, and a value in the panel's unit
+  look,           // "all", "contact", "x", "y" or "z"
+  clip,           // "off", or an axis and a number
+  file,           // a file name; may be left out
   key,
   point,  // two numbers
-  drag,   // four numbers, and a button that may be left out
+  drag,   // four numbers, and a button, which may be left out
 };
 struct ScriptCommand {
   std::string_view name;
@@ -59,7 +59,7 @@ constexpr std::array<ScriptCommand, 22> kScriptCommands{
      {"save-scene", ViewVerb::save_scene, ScriptArguments::none, "save-scene"},
      {"quit", ViewVerb::quit, ScriptArguments::none, "quit"}}};
 
-// Words of a line, up to a comment.
+// The words of a line, without a comment at its end.
 std::vector<std::string> words_of_line(std::string_view line) {
   std::vector<std::string> words;
   for (std::size_t at = 0; at < line.size();) {

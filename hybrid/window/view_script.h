@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A script plays the user of a window: keys, clicks, edits and views at given times, for tutorials and tests.
-// Knows no graphics library.
+// A script acts as the user of a window, for tutorials and tests: keys, clicks, edits and views at given
+// times. Knows no graphics library.
 #pragma once
 
 #include <span>
@@ -13,18 +13,19 @@ namespace hybrid {
 
 class Window;
 
-// A line has a time (s, since the window opened; with --frames 1/30 s a frame), a command and its arguments,
-// apart by spaces; names with spaces stand in quotes, # begins a comment. Times do not fall. The commands are
-// in README.md.
+// A line has a time, a command and its arguments, separated by spaces. Names with spaces are in quotes, and #
+// begins a comment. The time is in seconds since the window opened; with --frames each frame counts 1/30 s.
+// Times never fall. README.md lists the commands.
 class ViewScript {
  public:
   ViewScript() = default;
-  // Throws std::runtime_error with file and line: unknown command, object or key, wrong number, falling time.
+  // Throws std::runtime_error that names file and line: unknown command, object or key; wrong number; falling
+  // time.
   ViewScript(const std::string& text, const std::string& file, const DrawnScene& scene);
 
-  // Plays all actions up to this time that were not played yet.
+  // Plays all actions up to this time that have not been played yet.
   void play(double t_s, Window& window);
-  // The same without a window.
+  // Returns the same actions, without a window.
   [[nodiscard]] std::vector<ViewAction> due(double t_s);
   [[nodiscard]] std::size_t size() const { return actions_.size(); }
 

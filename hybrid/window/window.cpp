@@ -29,7 +29,7 @@ std::string glfw_reason() {
   return glfwGetError(&text) != GLFW_NO_ERROR && text != nullptr ? text : "no reason given";
 }
 
-// GLFW is started with the first window and ended with the last.
+// GLFW runs as long as a window exists.
 struct Library {
   Library() {
     if (glfwInit() == GLFW_TRUE) return;
@@ -52,9 +52,9 @@ struct CloseWindow {
 
 enum class Drag { none, orbit, pan, tool };
 
-constexpr int kMostPixels = 8192;    // along a side of a frame
-constexpr int kDragFrames = 12;      // of a script's drag
-constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel is told
+constexpr int kMostPixels = 8192;    // most pixels along a side of a frame
+constexpr int kDragFrames = 12;      // frames that a script's drag takes
+constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets
 
 struct NamedKey {
   std::string_view name;
@@ -82,7 +82,7 @@ constexpr std::array<NamedKey, 17> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::t
 constexpr std::array<std::pair<char, UiKey>, 6> kLetters{
     {{'a', UiKey::a}, {'c', UiKey::c}, {'v', UiKey::v}, {'x', UiKey::x}, {'y', UiKey::y}, {'z', UiKey::z}}};
 
-// One step of what a script does with mouse and keyboard.
+// One step of a script's use of mouse and keyboard.
 struct ScriptEvent {
   enum class Kind : std::uint8_t { move, press, release, key_down, key_up, wheel, next_frame } kind;
   double x = 0.0, y = 0.0;
@@ -103,26 +103,26 @@ struct Window::State {
   const DrawnScene* scene;
   std::optional<FramePainter> painter;
   Camera camera;
-  bool framed = false;  // the view has been chosen (needs the first snapshot: it has the tool's position)
+  bool framed = false;  // has the view been chosen? It needs the tool's position from the first snapshot
   bool painted = false;
   Drag drag = Drag::none;
-  double x = 0.0, y = 0.0;  // of the pointer (pixels of the framebuffer)
-  glm::dvec3 grip_m{0.0};   // from the point under the pointer to the tool, at the start of the drag
-  // Tool's position at the start of the drag; the plane of the drag stays there. If the plane followed the
-  // device, contact could push the goal away.
+  double x = 0.0, y = 0.0;  // position of the pointer (pixels of the framebuffer)
+  glm::dvec3 grip_m{0.0};   // from the point under the pointer to the tool, when the drag began
+  // Position of the tool when the drag began. The plane of the drag goes through it and does not follow the
+  // device, because contact could then push the goal away.
   glm::dvec3 drag_plane_m{0.0};
   glm::dvec3 device_m{0.0};  // device position in the last frame
   std::optional<glm::dvec3> goal_m;
   ViewState user;
   UiInput input;
-  bool wants_text = false;  // of the panel
+  bool wants_text = false;  // the panel takes typed text
   TickHistory history;
   Panels panels;
   std::deque<ScriptEvent> events;
   std::chrono::steady_clock::time_point last_frame = std::chrono::steady_clock::now();
   bool visible = true;
   int width = 0, height = 0;
-  FrameLayout layout;  // of the last frame
+  FrameLayout layout;  // layout of the last frame
 
   State(const DrawnScene& drawn, const WindowOptions& options)
       : scene(&drawn), history(options.history_s), visible(options.visible) {
@@ -131,7 +131,7 @@ struct Window::State {
 
   static State& of(GLFWwindow* handle) { return *static_cast<State*>(glfwGetWindowUserPointer(handle)); }
 
-  // Pointer positions are in screen units, drawing is in pixels; on some displays they differ.
+  // Takes a pointer position in screen units. Drawing is in pixels; on some displays the two differ.
   void pointer(double screen_x, double screen_y) {
     int screen_width = 0;
     int screen_height = 0;
@@ -169,7 +169,7 @@ struct Window::State {
     }
   }
 
-  // Point of the drag's plane that the scene shows under the pointer.
+  // The point in the drag's plane that the scene shows under the pointer.
   [[nodiscard]] glm::dvec3 under_pointer() const {
     const PixelRect& view = layout.scene;
     return camera.point_at({x - view.x, y - view.y}, view.width, view.height, drag_plane_m);
@@ -193,7 +193,7 @@ struct Window::State {
       drag = Drag::pan;
     } else if (which == GLFW_MOUSE_BUTTON_RIGHT || (which == GLFW_MOUSE_BUTTON_LEFT && shift)) {
       drag = Drag::tool;
-      // The drag starts from the tool's position: the tool does not jump to the pointer.
+      // The drag starts at the tool's position, so that the tool does not jump to the pointer.
       drag_plane_m = device_m;
       grip_m = drag_plane_m - under_pointer();
       goal_m = drag_plane_m;
@@ -211,7 +211,8 @@ struct Window::State {
     camera.distance_m = std::clamp(camera.distance_m, 1e-9, 1e9);
   }
 
-  // A key by its name. Keys that move among controls reach the panel only while it has the keyboard.
+  // Handles a key, given by its name. Keys that move between controls reach the panel only if it has the
+  // keyboard's focus.
   void key(std::string_view name, bool pressed) {
     bool for_panel = false;
     for (const NamedKey& k : kNamedKeys) {
@@ -276,7 +277,7 @@ struct Window::State {
     add(Kind::next_frame);
   }
 
-  // The script's events of this frame.
+  // Plays the script's events of this frame.
   void play_events() {
     using Kind = ScriptEvent::Kind;
     while (!events.empty()) {
@@ -321,7 +322,7 @@ struct Window::State {
     input.end_frame();
   }
 
-  // Hidden frames all last equally long, so that they are reproducible.
+  // All hidden frames last equally long, so that they are reproducible.
   void measure_frame() {
     const auto now = std::chrono::steady_clock::now();
     const float real_s = std::chrono::duration<float>(now - std::exchange(last_frame, now)).count();
@@ -388,7 +389,7 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   s.device_m = snapshot.device_m;
   s.measure_frame();
   glfwGetFramebufferSize(handle, &s.width, &s.height);
-  if (s.width < 1 || s.height < 1) return true;  // minimised: nothing to draw
+  if (s.width < 1 || s.height < 1) return true;  // minimised: there is nothing to draw
   s.layout = frame_layout(s.width, s.height, true, s.user.panels);
   s.choose_view(snapshot);
   glfwMakeContextCurrent(handle);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer's window. It reads snapshots only. It reports what mouse, keyboard, panel and scripts ask of the
-// session, and does not act on it. The only part of the project that knows GLFW. All calls must come from one
-// thread, the program's first. The keys are in README.md and in window_keys.h.
+// The viewer's window. It reads snapshots only. It reports the requests of mouse, keyboard, panel and scripts
+// to the session, and does not act on the session. No other part of the project knows GLFW. All calls must
+// come from the program's first thread. The keys are in README.md and in window_keys.h.
 #pragma once
 
 #include <filesystem>
@@ -20,18 +20,19 @@ struct WindowOptions {
   int width = 1280, height = 960;  // (screen units; pixels on most displays)
   bool visible = true;             // false: a hidden window whose frames can be saved
   bool panels = true;
-  double history_s = 5.0;  // length of the charts
+  double history_s = 5.0;  // time span of the charts
 };
 
 // User input that concerns the session rather than the view.
 struct WindowInput {
-  std::optional<glm::dvec3> dragged_goal_m;  // goal of the tool's drag (scene frame); empty: no drag
+  // Goal of the tool while it is dragged (scene's frame); empty: no drag.
+  std::optional<glm::dvec3> dragged_goal_m;
   bool paused = false;
   double speed = 1.0;
-  std::uint32_t restarts = 0, single_ticks = 0;  // since the window opened
+  std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
   // ---- since the last call ----
   std::vector<Edit> edits;
-  std::optional<std::filesystem::path> recording;  // to be saved; empty path: a name that is free
+  std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name
   bool save_scene = false, reload = false;
 };
 
@@ -46,26 +47,26 @@ class Window {
   Window& operator=(Window&&) = delete;
   ~Window();
 
-  // Shows another scene from now on; view and selection stay. Keeps a reference to it.
+  // Shows another scene from now on. View and selection stay. Keeps a reference to the scene.
   void show_scene(const DrawnScene& scene);
 
   // Shows a snapshot and handles the input since the last call. Waits for the display's refresh. Returns
-  // false when the user closed the window. Throws std::runtime_error when the driver fails.
+  // false if the user closed the window. Throws std::runtime_error if the driver fails.
   bool frame(const Snapshot& snapshot, const SessionNotes& notes = {});
 
-  // Every tick since the last frame, for the charts.
+  // Adds every tick since the last frame, for the charts.
   void add_ticks(TickSamples& samples);
-  // Does what a script asks for, in the next frame.
+  // Does an action of a script in the next frame.
   void act(const ViewAction& action);
   // Returns the input since the last call.
   [[nodiscard]] WindowInput take_input();
 
-  // The view; may be changed between frames.
+  // The view. It may be changed between frames.
   [[nodiscard]] Camera& camera();
 
-  // Writes the last frame as PNG. Throws std::runtime_error: no frame yet, file not writable.
+  // Writes the last frame as a PNG file. Throws std::runtime_error: no frame yet, file not writable.
   void save_frame(const std::filesystem::path& png);
-  // The picture that the user asked for since the last call; empty path: a name that is free.
+  // The file of the picture that the user asked for since the last call; empty path: an unused name.
   [[nodiscard]] std::optional<std::filesystem::path> take_screenshot();
 
  private:

@@ -7,7 +7,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kClipStep = 0.02;  // of the scene, for a press of [ or ]
+constexpr double kClipStep = 0.02;  // step of a press of [ or ], as a share of the scene's size
 
 struct KeyAction {
   std::string_view key;
@@ -38,7 +38,7 @@ std::optional<ViewAction> action_of_key(std::string_view key, bool control, cons
   const auto at = std::find_if(kKeyActions.begin(), kKeyActions.end(),
                                [key](const KeyAction& action) { return action.key == key; });
   if (at == kKeyActions.end()) return {};
-  // Only saving over a file needs two keys at once.
+  // Only saving needs Ctrl too, because it overwrites a file.
   if (control != (at->verb == ViewVerb::save_scene)) return {};
   ViewAction action{.verb = at->verb, .text = std::string(at->text)};
   if (at->number >= 0.0) action.numbers = {at->number};

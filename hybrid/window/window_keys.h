@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The window's keys: their names in scripts, and what they do. Knows no graphics library.
+// The window's keys: their names in scripts, and their actions. Knows no graphics library.
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@
 
 namespace hybrid {
 
-// The line below the scene.
+// The line of help below the scene.
 inline constexpr std::string_view kWindowHelp =
     "drag: orbit   wheel: zoom   right drag: pull the tool   space: pause   N: tick   F C X Y Z: views   "
     "K: clip   Tab: keys to panel   H: panel";
 
-// Action of a key: "space", "escape", "[", "a" to "z", "0" to "9", …; with `control` held for the last ones.
-// Empty: none.
+// Action of a key: "space", "escape", "[", "a" to "z", "0" to "9", …. `control`: the Ctrl key is held. Empty:
+// the key has no action.
 [[nodiscard]] std::optional<ViewAction> action_of_key(std::string_view key, bool control,
                                                       const ViewState& state);
 // Is it the name of a key that a script may press?

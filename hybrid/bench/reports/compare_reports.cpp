@@ -17,16 +17,17 @@ namespace {
 
 using Row = nlohmann::ordered_json;
 
-// A user just notices a tick that takes a period of 1 kHz longer, or a second of waiting.
+// The least changes that a user notices: a tick that takes one period of 1 kHz longer, and a second of
+// waiting.
 constexpr double kTickPeriod_us = 1e3, kWait_us = 1e6;
 
 struct MatchedRows {
   std::vector<const Row*> olds, news;
 };
-// By the identity, in the order of the reports. Pointers go into the reports.
+// The rows of a suite by their identity, in the order of the reports. Pointers refer to the reports.
 struct MatchedSuite {
   std::vector<Row> order;
-  std::map<std::string, MatchedRows> rows;  // by the identity as text
+  std::map<std::string, MatchedRows> rows;  // key: the identity as text
   std::set<std::string> old_keys, new_keys;
 };
 
@@ -57,7 +58,7 @@ void match_side(std::span<const BenchReport> reports, bool old, std::map<std::st
   }
 }
 
-// The names of the keys that differ between the rows of a suite.
+// The keys by which the rows of a suite can be told from one another.
 std::vector<std::string_view> telling_keys(const std::string& suite, const std::vector<Row>& identities) {
   std::vector<std::string_view> telling;
   for (const bool details : {false, true}) {
@@ -94,7 +95,7 @@ std::string label_of(const std::string& suite, const Row& identity,
   return label;
 }
 
-// The figures of a time are for a tick, or for a wait.
+// The least change of a figure that a user notices (µs): that of a tick, or that of a wait.
 double noticed_us(const ComparedFigure& figure) {
   const auto is = [&figure](const char* key, const char* value) {
     return value_at(figure.identity, key) == value;
@@ -106,7 +107,7 @@ double in_us(const std::string& key) {
   if (key.ends_with("_ms")) return 1e3;
   if (key.ends_with("_ns")) return 1e-3;
   const bool us = key.ends_with("_us") || key.starts_with("tick_us.") || key.starts_with("pose_us.");
-  return us ? 1.0 : 0.0;  // 0: no time
+  return us ? 1.0 : 0.0;  // 0: the figure is no time
 }
 
 double number_of(const Row& value) {
@@ -145,8 +146,9 @@ bool same_basis(const MatchedRows& rows, std::string_view basis) {
   return all_equal(values);
 }
 
-// Exact figures are ranked if the reports do not show that they are exact: they differ between the old runs,
-// or between the new runs when there is a single old one.
+// Is the figure judged by the rank test? Measured figures are. So are exact figures that the reports do not
+// show to be exact: their values differ between the old runs, or between the new runs if there is a single
+// old run.
 bool is_ranked(const ReportKey& key, const MatchedRows& rows, const ComparedFigure& figure) {
   if (key.kind == KeyKind::measured) return true;
   if (!all_numbers(figure.old_values) || !all_numbers(figure.new_values)) return false;
@@ -183,7 +185,8 @@ void judge_ranked(ComparedFigure& figure) {
   figure.verdict = enough ? Verdict::noise : Verdict::unknown;
 }
 
-// Figures that are all equal say nothing, whichever runs are old, so they are no part of the family.
+// Judges the figures of a family together. Figures whose values are all equal carry no information, whichever
+// runs are old, so they do not belong to the family.
 void judge_family(Family family, ReportComparison& comparison) {
   std::vector<ComparedFigure*> members;
   std::vector<double> p;
@@ -219,7 +222,8 @@ bool all_positive(const std::vector<Row>& values) {
                      [](const Row& value) { return value.is_number() && value.get<double>() > 0.0; });
 }
 
-// Run by run the geometric mean of a felt figure over the rows that have it in every run.
+// Adds an overall figure: for each run, the geometric mean of a felt figure over the rows that have it in
+// every run.
 void add_overall(const std::string& suite, std::string_view key, ReportComparison& comparison) {
   std::vector<const ComparedFigure*> rows;
   std::size_t olds = 0, news = 0;
@@ -257,7 +261,8 @@ void add_overall(const std::string& suite, std::string_view key, ReportCompariso
   comparison.figures.push_back(std::move(overall));
 }
 
-// Changed ones first: exact ones before times, the product before baselines, then the most noticed.
+// Order: changed figures first. Then exact figures before times, the product before baselines, and the most
+// noticed first.
 void sort_figures(std::vector<ComparedFigure>& figures) {
   const auto place = [](const ComparedFigure& figure) {
     const double change = figure.ratio > 0.0 ? std::fabs(std::log(figure.ratio)) : 0.0;

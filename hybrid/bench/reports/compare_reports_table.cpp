@@ -10,9 +10,10 @@
 namespace hybrid::bench {
 namespace {
 
-// Rows of the table unless all are asked for.
+// Rows of the table at most, unless all are asked for.
 constexpr std::size_t kMostChanged = 60, kMostUnchanged = 10, kMostRowsOfOne = 20;
-constexpr std::size_t kMostValues = 4;  // of an exact figure that differs between runs
+// Values listed for an exact figure that differs between runs, at most.
+constexpr std::size_t kMostValues = 4;
 
 const char* verdict_name(Verdict verdict) {
   switch (verdict) {
@@ -42,7 +43,7 @@ std::string figure_text(double value) {
   return fmt::format("{:.4g}", value);
 }
 
-// The values of an exact figure, each once: "3", or "3, 4" where runs differ.
+// The values of an exact figure, each listed once: "3", or "3, 4" if runs differ.
 std::string exact_text(const std::vector<nlohmann::ordered_json>& values) {
   std::vector<std::string> texts;
   for (const auto& value : values) {
@@ -135,7 +136,7 @@ const char* family_name(Family family) {
   return "";
 }
 
-// The number of runs that a change of a single figure takes.
+// The number of runs needed to detect a change of a single figure.
 std::string runs_text(const ReportComparison& comparison) {
   static constexpr std::array kNames{"means over rows", "medians and p99 of rows", "other measured figures"};
   std::string text;

@@ -9,7 +9,7 @@
 namespace hybrid::bench {
 namespace {
 
-// Twice the mean ranks of the values of both samples, those of the first sample first. Twice a mean rank is a
+// Twice the mean ranks of the values of both samples; the first sample comes first. Twice a mean rank is a
 // whole number.
 std::vector<std::size_t> doubled_ranks(std::span<const double> first, std::span<const double> second) {
   std::vector<double> values(first.begin(), first.end());
@@ -29,8 +29,8 @@ std::size_t sum_of(const std::vector<std::size_t>& values, std::size_t count) {
   return std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count), std::size_t{0});
 }
 
-// Share of the choices of `chosen` ranks whose sum is as far from its mean as `sum`, or further. The choices
-// are counted by their number and sum, one rank after another; they are fewer than 2^53.
+// Share of all choices of `chosen` ranks whose sum is at least as far from its mean as `sum`. Choices are
+// counted by their size and sum, one rank after another. There are fewer than 2^53 of them.
 double exact_p(const std::vector<std::size_t>& ranks, std::size_t chosen, std::size_t sum) {
   const std::size_t total = sum_of(ranks, ranks.size());
   std::vector<std::vector<double>> ways(chosen + 1, std::vector<double>(total + 1, 0.0));
@@ -40,7 +40,7 @@ double exact_p(const std::vector<std::size_t>& ranks, std::size_t chosen, std::s
       for (std::size_t s = total; s >= ranks[seen]; --s) ways[count][s] += ways[count - 1][s - ranks[seen]];
     }
   }
-  // Times the number of ranks, so that the mean is a whole number.
+  // All is multiplied by the number of ranks, so that the mean is a whole number.
   const auto distance = [&](std::size_t s) {
     const std::size_t at = s * ranks.size(), mean = total * chosen;
     return at > mean ? at - mean : mean - at;
@@ -53,7 +53,7 @@ double exact_p(const std::vector<std::size_t>& ranks, std::size_t chosen, std::s
   return as_far / all;
 }
 
-// Pairs in which the value of the second sample is greater.
+// Number of pairs in which the value of the second sample is greater; a tie counts half.
 double pairs_greater(const std::vector<std::size_t>& ranks, std::size_t first, std::size_t second) {
   const auto n = static_cast<double>(first), m = static_cast<double>(second);
   return n * m + 0.5 * n * (n + 1.0) - 0.5 * static_cast<double>(sum_of(ranks, first));
@@ -67,7 +67,7 @@ double normal_p(std::span<const double> first, std::span<const double> second) {
   const auto n = static_cast<double>(first.size()), m = static_cast<double>(second.size()), all = n + m;
   const double u = pairs_greater(ranks, first.size(), second.size());
   std::sort(ranks.begin(), ranks.end());
-  double ties = 0.0;  // sum of t³ − t over groups of t equal values
+  double ties = 0.0;  // sum of t³ − t over the groups of t equal values
   for (auto from = ranks.begin(); from != ranks.end();) {
     const auto to = std::upper_bound(from, ranks.end(), *from);
     const auto t = static_cast<double>(to - from);
@@ -76,7 +76,8 @@ double normal_p(std::span<const double> first, std::span<const double> second) {
   }
   const double variance = n * m / 12.0 * (all + 1.0 - ties / (all * (all - 1.0)));
   if (!(variance > 0.0)) return 1.0;
-  const double off = std::max(0.0, std::fabs(u - 0.5 * n * m) - 0.5);  // half a pair for continuity
+  // Half a pair as correction for continuity.
+  const double off = std::max(0.0, std::fabs(u - 0.5 * n * m) - 0.5);
   return std::erfc(off / std::sqrt(variance) / std::numbers::sqrt2);
 }
 
@@ -91,14 +92,14 @@ RankTest rank_test(std::span<const double> first, std::span<const double> second
 }
 
 double least_p(std::size_t first, std::size_t second) {
-  double choices = 1.0;  // of `first` out of all
+  double choices = 1.0;  // number of ways to choose `first` values out of all
   for (std::size_t i = 1; i <= first; ++i)
     choices *= static_cast<double>(second + i) / static_cast<double>(i);
   return std::min(1.0, 2.0 / choices);
 }
 
 std::size_t size_for(double p) {
-  constexpr std::size_t kMost = 500;  // the number of choices is still finite
+  constexpr std::size_t kMost = 500;  // up to this size the number of choices is finite
   std::size_t size = 1;
   while (size < kMost && least_p(size, size) > p) ++size;
   return size;
@@ -124,7 +125,8 @@ Quartiles quartiles_of(std::vector<double> values) {
     const double place = share * static_cast<double>(values.size() - 1);
     const auto below = static_cast<std::size_t>(place);
     const double between = place - static_cast<double>(below);
-    if (between == 0.0 || values[below] == values[below + 1]) return values[below];  // may be infinite
+    // The value may be infinite.
+    if (between == 0.0 || values[below] == values[below + 1]) return values[below];
     return values[below] + between * (values[below + 1] - values[below]);
   };
   return {at(0.25), at(0.5), at(0.75)};

@@ -37,7 +37,7 @@ std::string string_or_empty(const nlohmann::ordered_json& report, const char* ke
   return found != report.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
-// The place of a byte, as editors count.
+// Line and column of a byte, counted as in editors.
 std::string line_and_column(const std::string& text, std::size_t byte) {
   std::size_t line = 1, column = 1;
   for (std::size_t i = 0; i + 1 < byte && i < text.size(); ++i) {

@@ -12,20 +12,20 @@ namespace hybrid::bench {
 
 struct BenchReport {
   std::string file;
-  std::string version{}, machine{}, build{};  // empty: the report does not say
+  std::string version{}, machine{}, build{};  // empty: not in the report
   bool quick = false, stopped = false;
-  nlohmann::ordered_json suites{};  // name: rows; each row has the keys that identify it
+  nlohmann::ordered_json suites{};  // rows by the name of the suite; each row has the keys that identify it
 };
 
-// Throws std::invalid_argument, with the file, the place in it and a remedy: not readable, not JSON, not a
-// report of `hybrid bench`, or rows that are not those of REPORTS.md.
+// Throws std::invalid_argument with the file, the place in it and a remedy: the file is not readable, not
+// JSON, no report of `hybrid bench`, or its rows do not match REPORTS.md.
 BenchReport read_bench_report(const std::filesystem::path& file);
 
-// The same of a side of a comparison. A file that is given twice, or a copy of one, is refused: it is not a
-// run of its own.
+// Reads all reports of one side of a comparison. Throws the same errors. Also refuses a file that is given
+// twice, or a copy of one, because it is not a separate run.
 std::vector<BenchReport> read_bench_reports(const std::vector<std::filesystem::path>& files);
 
-// The value of "pose_us.p99", or of a plain key; null where there is none.
+// The value of a key such as "pose_us.p99", or of a plain key; null if it is missing.
 nlohmann::ordered_json value_at(const nlohmann::ordered_json& row, std::string_view key);
 
 }  // namespace hybrid::bench
