@@ -74,7 +74,7 @@ void add_run(CLI::App& app, int& status) {
       ->capture_default_str();
   sub->add_option("--trace", c->trace, "write every tick as CSV");
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
-  sub->add_option("--picture", c->picture, "write a picture of the most telling moment as PNG");
+  sub->add_option("--picture", c->picture, "write a picture of the moment with the most contact as PNG");
   sub->add_option("--record", c->record, "write a recording for `hybrid replay`");
   sub->add_option("--black-box", c->black_box,
                   "where the 2 s around the first fault go; default in real time: SCENE-fault.csv here");
@@ -224,7 +224,7 @@ void add_tune(CLI::App& app, int& status) {
   sub->add_option("--error-jnd", c->error_jnd, "error that may be felt: p99, in JND")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  sub->add_flag("--quick", c->quick, "fewer settings and a coarser truth; a few minutes");
+  sub->add_flag("--quick", c->quick, "fewer settings and passes; a few minutes");
   auto* apply =
       sub->add_flag("--apply", c->apply, "write the choice into the scene's file; the rest of it stays");
   sub->add_option("--out", c->out, "write the choice into a new scene file, in the folder of the scene")

@@ -2,6 +2,7 @@
 // Frames, units and scaling as headers state them: against a volume whose labels lie in known places.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <sstream>
@@ -10,6 +11,7 @@
 #include "tests/voxel/volume/base_volume.h"
 #include "tests/voxel/volume/volume_folder.h"
 #include "voxel/volume/length_unit.h"
+#include "voxel/volume/number_at.h"
 
 namespace {
 
@@ -74,6 +76,18 @@ const std::vector<SpaceCase>& anatomical_spaces() {
                                           {"leftposteriorsuperior", {-1, -1, 1}},
                                           {"las", {-1, 1, 1}}};
   return all;
+}
+
+// strtod() of the C locale is the reference.
+TEST(NumberAt, ReadsWhatTheCLocaleReads) {
+  for (const char* text :
+       {"1.5 2", " -3e2", "+7", "1e400", "-1e400", "1e-400", "-1e-400", "0x", "", "nine", "+-1"}) {
+    const char* end = nullptr;
+    char* expected_end = nullptr;
+    const double expected = std::strtod(text, &expected_end);
+    EXPECT_EQ(voxel::number_at(text, &end), expected) << text;
+    EXPECT_EQ(end, expected_end) << text;
+  }
 }
 
 TEST_F(VolumeHeaders, EverySpaceOfNrrdPutsLabelsInTheSamePlace) {
