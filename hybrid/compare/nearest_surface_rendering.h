@@ -16,7 +16,7 @@ struct ClassicForce {
 
 // A ball of `radius_m` at the device, which may lie anywhere in the object. Outside a solid, and by a sheet,
 // F = K·(radius − distance) away from the nearest point; inside a solid, F = K·(radius + distance) towards
-// it.
+// it. On the surface of a solid both agree: F = K·radius outward. On a sheet they are opposite: F = 0.
 ClassicForce nearest_surface_force(const polygon::RigidSurface& surface, const Pose& pose,
                                    const glm::dvec3& device_m, double radius_m,
                                    double stiffness_N_per_m) noexcept;
