@@ -4,16 +4,29 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "polygon/mesh/mesh.h"
 #include "voxel/volume/label_volume.h"
 
 namespace hybrid {
 
+// The intensities of a volume's voxels, and the range of those that are inside.
+struct IntensityRange {
+  std::span<const float> intensities;  // as many as labels
+  double lower = 0.0, upper = 0.0;
+};
+
 // Surface of all voxels whose label is not 0, in the volume frame (m): closed, oriented outward, by surface
 // nets (Gibson 1998). Boundary cells have one vertex per sheet, and quads are split into triangles. Then
 // follow `smoothing` constrained smoothing passes, in which a vertex stays within its cell.
 polygon::TriangleMesh surface_from_labels(const voxel::LabelVolume& volume, int smoothing);
+
+// The same surface, but its vertices begin where the intensity passes an end of the range, linearly between
+// two voxel centres, and not half way. So a scan's surface lies between its voxels. Where the labels differ
+// from the range (pieces that were dropped, cavities that were filled), half way is taken.
+polygon::TriangleMesh surface_from_intensities(const voxel::LabelVolume& volume, const IntensityRange& range,
+                                               int smoothing);
 
 // Keeps the largest 6-connected piece; `fill_cavities` also labels (1) enclosed empty space.
 void keep_largest_piece(voxel::LabelVolume& volume, bool fill_cavities);
