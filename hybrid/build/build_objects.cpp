@@ -15,6 +15,7 @@
 #include "polygon/repair/check.h"
 #include "polygon/surface/mesh_surface.h"
 #include "polygon/surface/primitives.h"
+#include "voxel/volume/intensity_volume.h"
 #include "voxel/volume/read_volume.h"
 
 namespace hybrid {
@@ -77,24 +78,64 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-// Reads a volume. Repairs that its reader made are added to `notes`.
+// Repairs by the file's reader are reported to the user.
+void add_notes(const std::string& object, const std::filesystem::path& file,
+               const std::vector<std::string>& of_file, std::vector<BuildNote>& notes) {
+  for (const std::string& note : of_file)
+    notes.push_back({object, polygon::Severity::warning, fmt::format("{}: {}", file.string(), note)});
+}
 voxel::LabelVolume read_volume(const std::string& object, const std::filesystem::path& file,
                                const voxel::VolumeFileOptions& options, std::vector<BuildNote>& notes) {
   std::vector<std::string> of_file;
   voxel::LabelVolume volume = voxel::load_volume(file, options, &of_file);
-  for (const std::string& note : of_file)
-    notes.push_back({object, polygon::Severity::warning, fmt::format("{}: {}", file.string(), note)});
+  add_notes(object, file, of_file, notes);
   return volume;
+}
+
+// A range of intensities is asked for, and not labels. A grown surface has no intensities.
+bool follows_intensities(const VolumeSurfaceSource& s) {
+  return s.rules.size() == 1 && s.rules[0].lower < s.rules[0].upper && s.grow_m == 0.0;
+}
+
+// Both return the surface in the frame of `volume`, which receives the labels.
+polygon::TriangleMesh intensity_surface(const std::string& object, const VolumeSurfaceSource& s,
+                                        const voxel::VolumeFileOptions& options, voxel::LabelVolume& volume,
+                                        std::vector<BuildNote>& notes) {
+  std::vector<std::string> of_file;
+  voxel::IntensityVolume read = voxel::load_intensities(s.file, options, &of_file);
+  add_notes(object, s.file, of_file, notes);
+  volume = std::move(read.labels);
+  if (s.largest) keep_largest_piece(volume, true);
+  if (read.intensities.empty()) {
+    notes.push_back(
+        {object, polygon::Severity::warning,
+         "its surface follows the voxels, because their intensities do not fit into memory; choose "
+         "a larger spacing for one between them"});
+    return surface_from_labels(volume, s.smooth);
+  }
+  // Whole numbers are rounded: 300 is all from 299.5 on.
+  const double rounded = read.whole_numbers ? 0.5 : 0.0;
+  return surface_from_intensities(
+      volume, {read.intensities, s.rules[0].lower - rounded, s.rules[0].upper + rounded}, s.smooth);
+}
+
+polygon::TriangleMesh label_surface(const std::string& object, const VolumeSurfaceSource& s,
+                                    const voxel::VolumeFileOptions& options, voxel::LabelVolume& volume,
+                                    std::vector<BuildNote>& notes) {
+  volume = read_volume(object, s.file, options, notes);
+  if (s.largest) keep_largest_piece(volume, true);
+  if (s.grow_m > 0.0) volume = grow_labels(volume, s.grow_m);
+  return surface_from_labels(volume, s.smooth);
 }
 
 RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurfaceSource& s,
                                   std::vector<BuildNote>& notes) {
   const std::optional<glm::dvec3> spacing =
       s.spacing_m ? std::optional<glm::dvec3>(glm::dvec3(*s.spacing_m)) : std::nullopt;
-  voxel::LabelVolume volume = read_volume(d.name, s.file, volume_options(s.rules, s.unit_m, spacing), notes);
-  if (s.largest) keep_largest_piece(volume, true);
-  if (s.grow_m > 0.0) volume = grow_labels(volume, s.grow_m);
-  polygon::TriangleMesh mesh = surface_from_labels(volume, s.smooth);
+  const voxel::VolumeFileOptions options = volume_options(s.rules, s.unit_m, spacing);
+  voxel::LabelVolume volume;
+  const auto surface = follows_intensities(s) ? intensity_surface : label_surface;
+  polygon::TriangleMesh mesh = surface(d.name, s, options, volume, notes);
   const Pose frame{d.pose.position_m + d.pose.rotation * volume.origin_m, d.pose.rotation * volume.rotation};
   if (mesh.empty())
     throw std::runtime_error(

@@ -98,6 +98,9 @@ RigidDescription as_rigid(const SoftDescription& soft) {
                                 .unit_m = volume.unit_m};
     if (volume.spacing_m) surface.spacing_m = volume.spacing_m->x;
     surface.largest = volume.largest;
+    // The rule once more changes no label. With two rules the surface follows the voxels, as that of the soft
+    // object does (build_objects.cpp), so that models of one object differ by the model alone.
+    if (surface.rules.size() == 1) surface.rules.push_back(surface.rules.front());
     rigid.source = surface;
   }
   return rigid;

@@ -4,6 +4,25 @@
 #include <glm/geometric.hpp>
 
 namespace hybrid {
+namespace {
+
+// Nearer to the surface than this share of the object's size, the direction to it is made of rounding.
+constexpr double kOnSurface = 1e-12;
+
+// Outward at a point of a solid's surface. A step off the surface finds the side of a shape that has no flat
+// faces: it is far above rounding, and far below what a hand feels.
+glm::dvec3 outward(const polygon::RigidSurface& surface, const polygon::NearPoint& on, double size_m) {
+  constexpr double kStep = 1e-7;  // of the object's size
+  const glm::dvec3 face = surface.face_normal(on.element);
+  if (face != glm::dvec3(0.0)) return face;
+  const glm::dvec3 centre = 0.5 * (surface.lower() + surface.upper());
+  polygon::NearPoint near;
+  const glm::dvec3 off = on.point + kStep * (on.point - centre);
+  const bool found = surface.nearest(off, size_m, near) && near.distance > 0.0;
+  return found ? (off - near.point) / near.distance : glm::dvec3(0.0);
+}
+
+}  // namespace
 
 ClassicForce nearest_surface_force(const polygon::RigidSurface& surface, const Pose& pose,
                                    const glm::dvec3& device_m, double radius_m,
@@ -12,7 +31,8 @@ ClassicForce nearest_surface_force(const polygon::RigidSurface& surface, const P
   const glm::dvec3 p = glm::inverse(pose.rotation) * (device_m - pose.position_m);
   const bool inside = surface.inside(p);
   // From inside there is always a way out. It is no longer than the diagonal of the object's box.
-  const double reach = inside ? glm::length(surface.upper() - surface.lower()) : radius_m;
+  const double size = glm::length(surface.upper() - surface.lower());
+  const double reach = inside ? size : radius_m;
   polygon::NearPoint near;
   if (!surface.nearest(p, reach, near)) return out;
   const glm::dvec3 away = inside ? near.point - p : p - near.point;
@@ -21,8 +41,13 @@ ClassicForce nearest_surface_force(const polygon::RigidSurface& surface, const P
   if (!(depth > 0.0)) return out;
   out.surface_m = pose.position_m + pose.rotation * near.point;
   out.contact = true;
-  // On the surface itself the distance is 0. Then this model has no direction, and so no force.
-  if (distance > 0.0) out.force_N = (stiffness_N_per_m * depth / distance) * (pose.rotation * away);
+  glm::dvec3 direction(0.0);
+  if (distance > (surface.solid() ? kOnSurface * size : 0.0)) {
+    direction = away / distance;
+  } else if (surface.solid()) {
+    direction = outward(surface, near, size);
+  }  // on a sheet neither side is right, and this model knows no other
+  out.force_N = stiffness_N_per_m * depth * (pose.rotation * direction);
   return out;
 }
 

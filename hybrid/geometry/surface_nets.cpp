@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <glm/common.hpp>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -141,9 +142,13 @@ struct Net {
   std::vector<Quad> quads;
 };
 
+// (unit: spacing) of a crossing from a voxel centre, where vertices of several cells could meet.
+constexpr double kLeastCrossing = 0.01;
+
 class NetBuilder {
  public:
-  explicit NetBuilder(const LabelVolume& volume) : volume_(volume) {}
+  // `range`: null where only labels are known.
+  NetBuilder(const LabelVolume& volume, const IntensityRange* range) : volume_(volume), range_(range) {}
 
   Net build() {
     const std::array<int, 3>& n = volume_.dims;
@@ -232,7 +237,11 @@ class NetBuilder {
     // cell start apart, each a quarter of the way to its own edges, so that no two vertices coincide.
     for (int sheet = 0; sheet < cell.sheets.count; ++sheet) {
       glm::dvec3 position = glm::dvec3(i, j, k) + 0.5;
-      if (cell.sheets.count > 1) position += 0.25 * towards_edges(corners, cell.sheets, sheet);
+      if (range_ != nullptr) {
+        position = glm::dvec3(i, j, k) + mean_crossing(corners, cell.sheets, sheet, {i, j, k});
+      } else if (cell.sheets.count > 1) {
+        position += 0.25 * towards_edges(corners, cell.sheets, sheet);
+      }
       net_.positions.push_back(position);
       net_.cells.push_back({i, j, k});
     }
@@ -257,8 +266,9 @@ class NetBuilder {
     }
   }
 
-  // Vector from the cell's centre to the mean of the midpoints of a sheet's edges.
-  static glm::dvec3 towards_edges(unsigned corners, const Sheets& sheets, int sheet) {
+  // Mean over the edges on a sheet of place(axis, u, v).
+  template <class Place>
+  static glm::dvec3 mean_over_edges(unsigned corners, const Sheets& sheets, int sheet, const Place& place) {
     glm::dvec3 sum(0.0);
     double edges = 0.0;
     for (int edge = 0; edge < 12; ++edge) {
@@ -267,14 +277,61 @@ class NetBuilder {
       const int v = (edge >> 1) & 1;
       if (solid(corners, corner_at(axis, 0, u, v)) == solid(corners, corner_at(axis, 1, u, v))) continue;
       if (sheets.of(edge) != static_cast<std::uint32_t>(sheet)) continue;
-      sum[(axis + 1) % 3] += u - 0.5;
-      sum[(axis + 2) % 3] += v - 0.5;
+      sum += place(axis, u, v);
       edges += 1.0;
     }
     return sum / edges;
   }
 
+  // From the cell's centre to the mean of the midpoints of the edges on a sheet.
+  static glm::dvec3 towards_edges(unsigned corners, const Sheets& sheets, int sheet) {
+    return mean_over_edges(corners, sheets, sheet, [](int axis, int u, int v) {
+      glm::dvec3 middle(0.0);
+      middle[(axis + 1) % 3] = u - 0.5;
+      middle[(axis + 2) % 3] = v - 0.5;
+      return middle;
+    });
+  }
+
+  // From corner 0 of a cell to the mean of the points where the edges on a sheet pass the end of the range.
+  [[nodiscard]] glm::dvec3 mean_crossing(unsigned corners, const Sheets& sheets, int sheet,
+                                         const std::array<int, 3>& cell) const {
+    return mean_over_edges(corners, sheets, sheet, [&](int axis, int u, int v) {
+      const int near = corner_at(axis, 0, u, v), far = corner_at(axis, 1, u, v);
+      const bool near_is_in = solid(corners, near);
+      const double from_in =
+          crossing(at_corner(cell, near_is_in ? near : far), at_corner(cell, near_is_in ? far : near));
+      glm::dvec3 point(0.0);
+      point[axis] = near_is_in ? from_in : 1.0 - from_in;
+      point[(axis + 1) % 3] = u;
+      point[(axis + 2) % 3] = v;
+      return point;
+    });
+  }
+
+  // Intensity at a corner of a cell; empty outside the lattice.
+  [[nodiscard]] std::optional<double> at_corner(const std::array<int, 3>& cell, int corner) const {
+    const std::array<int, 3> at{cell[0] + (corner & 1), cell[1] + ((corner >> 1) & 1),
+                                cell[2] + (corner >> 2)};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (at[axis] < 0 || at[axis] >= volume_.dims[axis]) return std::nullopt;
+    }
+    return range_->intensities[volume_.index(at[0], at[1], at[2])];
+  }
+
+  // Where the intensity passes the end of the range, as a share of the way from a voxel inside to one
+  // outside.
+  [[nodiscard]] double crossing(std::optional<double> in, std::optional<double> out) const {
+    constexpr double half_way = 0.5;
+    if (!in || !out || !(*in >= range_->lower && *in <= range_->upper)) return half_way;
+    if (*out >= range_->lower && *out <= range_->upper) return half_way;
+    const double share = ((*out < range_->lower ? range_->lower : range_->upper) - *in) / (*out - *in);
+    if (!std::isfinite(share)) return half_way;
+    return std::clamp(share, kLeastCrossing, 1.0 - kLeastCrossing);
+  }
+
   const LabelVolume& volume_;
+  const IntensityRange* range_;
   std::size_t row_length_ = 0;
   std::vector<Cell> below_, here_;  // one layer of cells each; only entries of cells that were added are read
   Net net_;
@@ -312,12 +369,10 @@ void smooth(Net& net, int passes) {
   }
 }
 
-}  // namespace
-
-polygon::TriangleMesh surface_from_labels(const LabelVolume& volume, int smoothing) {
+polygon::TriangleMesh surface_of(const LabelVolume& volume, const IntensityRange* range, int smoothing) {
   check_volume(volume);
   if (volume.labels.empty()) return {};
-  Net net = NetBuilder(volume).build();
+  Net net = NetBuilder(volume, range).build();
   smooth(net, smoothing);
   polygon::TriangleMesh mesh;
   mesh.vertices = std::move(net.positions);
@@ -332,6 +387,19 @@ polygon::TriangleMesh surface_from_labels(const LabelVolume& volume, int smoothi
     mesh.triangles.push_back({q[turn], q[(turn + 2) % 4], q[(turn + 3) % 4]});
   }
   return mesh;
+}
+
+}  // namespace
+
+polygon::TriangleMesh surface_from_labels(const LabelVolume& volume, int smoothing) {
+  return surface_of(volume, nullptr, smoothing);
+}
+
+polygon::TriangleMesh surface_from_intensities(const LabelVolume& volume, const IntensityRange& range,
+                                               int smoothing) {
+  if (range.intensities.size() != volume.labels.size())
+    refuse("there are ", range.intensities.size(), " intensities for ", volume.labels.size(), " labels");
+  return surface_of(volume, &range, smoothing);
 }
 
 }  // namespace hybrid

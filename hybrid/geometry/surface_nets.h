@@ -4,18 +4,31 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "polygon/mesh/mesh.h"
 #include "voxel/volume/label_volume.h"
 
 namespace hybrid {
 
-// Surface of all voxels whose label is not 0, in the volume's frame (m), by surface nets (Gibson 1998). It is
-// closed and oriented outwards. Boundary cells have one vertex for each sheet, and quads are split into
-// triangles. `smoothing` is the number of smoothing passes, in which each vertex stays within its cell.
+// The intensities of a volume's voxels, and the range of those that are inside.
+struct IntensityRange {
+  std::span<const float> intensities;  // as many as labels
+  double lower = 0.0, upper = 0.0;
+};
+
+// Surface of all voxels whose label is not 0, in the volume frame (m): closed, oriented outward, by surface
+// nets (Gibson 1998). Boundary cells have one vertex per sheet, and quads are split into triangles. Then
+// follow `smoothing` constrained smoothing passes, in which a vertex stays within its cell.
 polygon::TriangleMesh surface_from_labels(const voxel::LabelVolume& volume, int smoothing);
 
-// Keeps only the largest 6-connected piece. `fill_cavities`: also gives label 1 to enclosed empty space.
+// The same surface, but its vertices begin where the intensity passes an end of the range, linearly between
+// two voxel centres, and not half way. So a scan's surface lies between its voxels. Where the labels differ
+// from the range (pieces that were dropped, cavities that were filled), half way is taken.
+polygon::TriangleMesh surface_from_intensities(const voxel::LabelVolume& volume, const IntensityRange& range,
+                                               int smoothing);
+
+// Keeps the largest 6-connected piece; `fill_cavities` also labels (1) enclosed empty space.
 void keep_largest_piece(voxel::LabelVolume& volume, bool fill_cavities);
 
 // Adds label 1 within `distance_m` (Euclidean) of filled voxels; the lattice is enlarged as needed.

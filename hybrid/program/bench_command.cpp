@@ -253,8 +253,41 @@ std::string bench_mesh_error(const std::string& name) {
 
 namespace {
 
-// Runs the chosen suites and adds their rows to `report`, row by row. Throws std::invalid_argument if there
-// is nothing to run.
+// What a suite knows by name.
+struct SuiteNames {
+  const char* suite;
+  std::vector<std::string> parts, engines;
+};
+std::vector<SuiteNames> suite_names() {
+  return {{"rigid", bench::rigid_paths(), names_of(bench::kEngines)},
+          {"soft", bench::soft_cases(), names_of(bench::kSoftEngines)},
+          {"occupancy", bench::occupancy_cases(), names_of(bench::kOccupancyEngines)}};
+}
+
+// Refuses chosen names that have an effect in none of the suites that run, and says what these know.
+void refuse_names_without_effect(const BenchCommand& command) {
+  std::vector<std::string> parts, engines;
+  for (const SuiteNames& names : suite_names()) {
+    if ((command.suite != "all" && command.suite != names.suite) ||
+        !has_work(command, names.parts, names.engines))
+      continue;
+    parts.insert(parts.end(), names.parts.begin(), names.parts.end());
+    engines.insert(engines.end(), names.engines.begin(), names.engines.end());
+  }
+  const auto check = [&command](const char* option, const auto& chosen, const auto& known) {
+    for (const std::string& name : chosen) {
+      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+      throw std::invalid_argument(
+          fmt::format("bench {}: {} {} has no effect there; leave it out, or choose of {}", command.suite,
+                      option, name, listed(known)));
+    }
+  };
+  if (parts.empty()) return;  // nothing runs, which run_suites() refuses
+  check("--only", command.only, parts);
+  check("--engines", command.engines, engines);
+}
+
+// Runs what was asked for into `report`, row by row. Throws std::invalid_argument: there is nothing to run.
 void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered_json& report) {
   std::FILE* words = outputs.words();
   nlohmann::ordered_json& suites = report["suites"] = nlohmann::ordered_json::object();
@@ -288,6 +321,7 @@ void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered
 }  // namespace
 
 int run_bench(const BenchCommand& command) {
+  refuse_names_without_effect(command);
   Outputs outputs;
   outputs.ask_plot(command.plot);
   outputs.ask_json(command.json);

@@ -9,14 +9,29 @@
 #include "hybrid/scene/table_reader.h"
 
 namespace hybrid {
+namespace {
+
+// Empty where nothing is near.
+std::string nearest(const std::string& word, const std::vector<std::string>& names) {
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  const std::string_view found = nearest_name(word, views);
+  const bool alike = 3 * edit_distance(word, found) <= std::max(word.size(), found.size()) + 1;
+  return alike ? std::string(found) : std::string();
+}
+
+}  // namespace
+
+std::string unknown_name(const std::string& name, const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), name) != known.end()) return {};
+  const std::string meant = nearest(name, known);
+  std::string text = "unknown name '" + name + "'";
+  if (!meant.empty()) text += ", did you mean '" + meant + "'?";
+  text += meant.empty() ? "; known are " : " Known are ";
+  for (const std::string& one : known) text += (&one == &known.front() ? "" : ", ") + one;
+  return text;
+}
 
 std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& arguments) {
-  const auto nearest = [](const std::string& word, const std::vector<std::string>& names) -> std::string {
-    const std::vector<std::string_view> views(names.begin(), names.end());
-    const std::string_view found = nearest_name(word, views);
-    const bool alike = 3 * edit_distance(word, found) <= std::max(word.size(), found.size()) + 1;
-    return alike ? std::string(found) : std::string();
-  };
   if (arguments.empty()) return {};
   const CLI::App* chosen = nullptr;
   std::vector<std::string> commands;

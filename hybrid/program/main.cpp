@@ -59,11 +59,11 @@ void add_run(CLI::App& app, int& status) {
       ->check(CLI::PositiveNumber);
   sub->add_flag("--realtime", c->realtime, "pace the loop with a real timer at the device's rate");
   add_device(*sub, c->device);
-  sub->add_option(
-         "--samples", c->samples,
-         "most ticks in which the force of tissue is compared with the same path played slowly, which takes "
-         "several times as long as the session; 0: none; default: all")
-      ->check(CLI::Range(0, 1'000'000));
+  auto* samples = sub->add_option(
+      "--samples", c->samples,
+      "most ticks in which the force of tissue is compared with the same path played slowly, which takes "
+      "several times as long as the session; 0: none; default: all");
+  samples->check(CLI::Range(0, 1'000'000));
   sub->add_option("--start-ticks", c->start_ticks,
                   "begin with all clocks and counters as after so many ticks; nothing felt should differ");
   sub->add_option(
@@ -84,7 +84,11 @@ void add_run(CLI::App& app, int& status) {
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
   add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, &status] { status = hybrid::run(*c); });
+  sub->callback([c, samples, &status] {
+    if (samples->count() > 0 && c->samples > 0 && c->realtime)
+      throw CLI::ValidationError("--samples", "has no effect with --realtime; leave one of them out");
+    status = hybrid::run(*c);
+  });
 }
 
 void add_replay(CLI::App& app, int& status) {
@@ -199,6 +203,7 @@ void add_compare(CLI::App& app, int& status) {
   auto* classic = sub->add_flag("--classic", c->classic,
                                 "of --plot, one scene: draw the thesis's algorithm too, below the others")
                       ->needs(plot);
+  measured->excludes(object)->excludes(classic);
   add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([=, &status] {
@@ -236,7 +241,12 @@ void add_tune(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::tune_scene(*c); });
 }
 
-// Refuses options that have no effect in the suite, and names the suites in which they have one.
+CLI::Validator one_of(const std::vector<std::string>& known) {
+  return {[known](const std::string& name) { return hybrid::unknown_name(name, known); },
+          CLI::detail::generate_set(known)};
+}
+
+// Refuses options that have no effect in the suite, and names the suites in which they have.
 void refuse_unused(const CLI::App& bench, const std::string& suite) {
   for (const hybrid::BenchOption& option : hybrid::bench_options()) {
     const auto& suites = option.suites;
@@ -291,7 +301,7 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_flag("--every-tick", c->every_tick, "ask the exact reference at every tick; slow");
   sub->add_option("--only", c->only, "paths of rigid, cases of soft and occupancy, with commas between")
       ->delimiter(',')
-      ->check(CLI::IsMember(hybrid::bench_parts()));
+      ->check(one_of(hybrid::bench_parts()));
   auto* meshes =
       sub->add_option(
              "--meshes", c->meshes,
@@ -317,7 +327,7 @@ void add_bench(CLI::App& app, int& status) {
       ->check(CLI::Range(0.1, 3600.0));
   sub->add_option("--engines", c->engines, "engines, with commas between")
       ->delimiter(',')
-      ->check(CLI::IsMember(hybrid::bench_engines()));
+      ->check(one_of(hybrid::bench_engines()));
   sub->add_option("--trace", c->trace, "of rigid: write every run as CSV into this folder");
   sub->add_option("--plot", c->plot,
                   "as SVG: of soft relaxation round by round, classic's and ours; of occupancy look-ups over "
@@ -339,14 +349,16 @@ void add_stability(CLI::App& app, int& status) {
   auto e = std::make_shared<hybrid::ExtremesCommand>();
   e->table = false;
   sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
-  sub->add_option("--plot", c->plot, "write stiffness over damping and rate as SVG (rigid scenes)");
+  auto* plot = sub->add_option("--plot", c->plot, "stiffness over damping and rate as SVG (rigid scenes)");
   add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->add_flag("--extremes", e->table,
-                "instead: rigid, soft and mixed scenes with every setting taken to its end");
+                "instead: rigid, soft and mixed scenes with every setting taken to its end")
+      ->excludes(plot);
   sub->add_flag("--quick", c->quick, "a row of each kind, or a share of --extremes; some seconds");
   auto* ticks =
-      sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input");
+      sub->add_option("--fuzz-ticks", e->fuzz_ticks, "instead: so many ticks of random device input")
+          ->excludes(plot);
   sub->add_option("--seed", e->seed, "of --fuzz-ticks")->needs(ticks)->capture_default_str();
   sub->add_flag("--apart", e->async_relaxation, "with --fuzz-ticks: tissue is relaxed apart from the tick")
       ->needs(ticks);

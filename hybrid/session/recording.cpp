@@ -14,6 +14,7 @@
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/whole_file.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
+#include "hybrid/tick/tissue/work_budget.h"
 
 namespace hybrid {
 namespace {
@@ -47,6 +48,15 @@ bool are_edits(std::uint64_t bytes, bool with_edits) {
 
 bool is_edit(const Edit& edit) {
   return static_cast<std::uint32_t>(edit.quantity) < kEditedQuantities && std::isfinite(edit.value);
+}
+
+// Of a servo loop (unit: second): 1 MHz to 1 Hz, far beyond the rates that scenes and drivers have.
+constexpr double kLeastPeriod_s = 1e-6, kMostPeriod_s = 1.0;
+
+// Only values that save_recording() writes. Others would be replayed as something else.
+bool is_tick(const Tick& tick) {
+  return tick.fault <= static_cast<std::uint32_t>(device::DeviceFault::late) &&
+         tick.work_share <= WorkShare::kMostSteps;
 }
 
 std::uint64_t before_edits(const Header& header) {
@@ -110,7 +120,7 @@ Recording load_recording(const std::filesystem::path& file) {
   const bool sane =
       header.path_bytes <= size && header.text_bytes <= size && header.ticks <= size / sizeof(Tick) &&
       before_edits(header) <= size && are_edits(size - before_edits(header), with_edits) &&
-      header.dt_s > 0.0 && std::isfinite(header.dt_s) && header.max_force_N >= 0.0 &&
+      header.dt_s >= kLeastPeriod_s && header.dt_s <= kMostPeriod_s && header.max_force_N >= 0.0 &&
       header.resolution_m >= 0.0 && std::isfinite(header.resolution_m) && header.friction_N >= 0.0 &&
       std::isfinite(header.friction_N) && header.async_relaxation <= 1 &&
       std::all_of(header.start.begin(), header.start.end(), [](double x) { return std::isfinite(x); });
@@ -131,9 +141,11 @@ Recording load_recording(const std::filesystem::path& file) {
   recording.state_hash = header.state_hash;
   recording.start_m = {header.start[0], header.start[1], header.start[2]};
   recording.ticks.resize(header.ticks);
+  bool whole = true;
   for (RecordedTick& t : recording.ticks) {
     Tick tick{};
     in.read(reinterpret_cast<char*>(&tick), sizeof tick);
+    whole = whole && is_tick(tick);
     t = {{tick.position[0], tick.position[1], tick.position[2]},
          tick.hash,
          static_cast<device::DeviceFault>(tick.fault),
@@ -143,7 +155,9 @@ Recording load_recording(const std::filesystem::path& file) {
   recording.edits.resize((size - before_edits(header)) / sizeof(Edit));
   for (Edit& edit : recording.edits) in.read(reinterpret_cast<char*>(&edit), sizeof edit);
   if (!in) throw std::runtime_error(fmt::format("{}: could not be read to its end", file.string()));
-  if (!std::all_of(recording.edits.begin(), recording.edits.end(), is_edit))
+  if (!whole) throw std::runtime_error(fmt::format("{}: damaged ticks; copy it again", file.string()));
+  if (!std::ranges::all_of(recording.edits, is_edit) ||
+      !std::ranges::is_sorted(recording.edits, {}, &Edit::tick))
     throw std::runtime_error(fmt::format("{}: damaged edits; copy it again", file.string()));
   return recording;
 }

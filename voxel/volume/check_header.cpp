@@ -4,7 +4,6 @@
 #include <fstream>
 
 #include "voxel/volume/foreign_file.h"
-#include "voxel/volume/inspect_formats.h"
 #include "voxel/volume/text_header.h"
 
 namespace voxel {

@@ -55,6 +55,12 @@ struct VoxelPlace {
 // Throws VolumeError if the header does not describe a volume of the format.
 VoxelPlace inspect_volume(const std::filesystem::path& path, VolumeFormat format);
 
+// The headers of the three formats. Each fills `place`, whose file and size are set, and throws VolumeError
+// if the header does not describe one volume of its format.
+void inspect_nifti(const std::filesystem::path& path, VoxelPlace& place);
+void inspect_nrrd(const std::filesystem::path& path, VoxelPlace& place);
+void inspect_meta(const std::filesystem::path& path, VoxelPlace& place);
+
 // Throws VolumeError if the header announces more voxels than the file can hold; call before allocating.
 // Adds a note to the header if the file holds more bytes than announced.
 void check_file_size(const std::filesystem::path& path, const VoxelPlace& place, VolumeHeader& header);

@@ -2,7 +2,7 @@
 #include <bit>
 #include <cmath>
 
-#include "voxel/volume/inspect_formats.h"
+#include "voxel/volume/check_header.h"
 #include "voxel/volume/length_unit.h"
 #include "voxel/volume/text_header.h"
 

@@ -11,7 +11,7 @@
 #include <map>
 #include <sstream>
 
-#include "voxel/volume/inspect_formats.h"
+#include "voxel/volume/check_header.h"
 #include "voxel/volume/text_header.h"
 
 namespace voxel {

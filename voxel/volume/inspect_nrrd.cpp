@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 
-#include "voxel/volume/inspect_formats.h"
+#include "voxel/volume/check_header.h"
 #include "voxel/volume/length_unit.h"
 #include "voxel/volume/number_at.h"
 #include "voxel/volume/text_header.h"

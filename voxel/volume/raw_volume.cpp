@@ -145,9 +145,10 @@ Axis resample_axis(int voxels, double spacing, double wanted, bool reversed) {
   return axis;
 }
 
+// `intensities`: empty, or as many as labels.
 template <typename T, typename Label>
 void fill_labels(const VolumeData& data, const NextSlice& next, const std::array<Axis, 3>& axes,
-                 Label label_of, LabelVolume& volume) {
+                 Label label_of, LabelVolume& volume, std::span<float> intensities) {
   const auto nx = static_cast<std::size_t>(data.header.dims[0]);
   const auto slices = static_cast<std::size_t>(data.header.dims[2]);
   const std::vector<std::size_t>& from = axes[2].source;  // rising: only the first axis may be reversed
@@ -158,7 +159,9 @@ void fill_labels(const VolumeData& data, const NextSlice& next, const std::array
       for (const std::size_t j : axes[1].source) {
         for (const std::size_t i : axes[0].source) {
           const std::size_t at = j * nx + i;
-          volume.labels[out++] = label_of(value_at<T>(bytes, at), at, slice);
+          const T value = value_at<T>(bytes, at);
+          if (!intensities.empty()) intensities[out] = static_cast<float>(value);
+          volume.labels[out++] = label_of(value, at, slice);
         }
       }
     }
@@ -280,7 +283,7 @@ void check_options(const std::filesystem::path& path, const VolumeFileOptions& o
 }
 
 LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& data, const NextSlice& next,
-                         const VolumeFileOptions& options) {
+                         const VolumeFileOptions& options, std::vector<float>* intensities) {
   const VolumeHeader& header = data.header;
   LabelVolume volume;
   volume.rotation = header.rotation;
@@ -299,6 +302,10 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
   volume.origin_m = header.origin_m;
   if (options.spacing_m) volume.origin_m += header.rotation * first_centre;
   volume.labels.resize(voxels);
+  const double needed = static_cast<double>(header.bytes) + static_cast<double>(data.slice_bytes()) +
+                        static_cast<double>(voxels) * (1.0 + sizeof(float));
+  if (intensities != nullptr && needed <= static_cast<double>(options.max_bytes)) intensities->resize(voxels);
+  const std::span<float> kept = intensities != nullptr ? std::span<float>(*intensities) : std::span<float>();
   visit_component(data.component, [&](auto zero) {
     using T = decltype(zero);
     if (!options.rules.empty()) {
@@ -307,7 +314,7 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
           [&](T value, std::size_t, std::size_t) {
             return label_by_rules(static_cast<double>(value), options.rules);
           },
-          volume);
+          volume, kept);
       return;
     }
     const auto label_of = [&](T value, std::size_t index, std::size_t slice) {
@@ -321,7 +328,7 @@ LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& da
                     ", which is not a label from 0 to 255; say which range of intensities is meant, and of "
                     "which label");
     };
-    fill_labels<T>(data, next, axes, label_of, volume);
+    fill_labels<T>(data, next, axes, label_of, volume, kept);
   });
   return volume;
 }

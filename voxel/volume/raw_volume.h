@@ -82,8 +82,10 @@ void check_memory(const std::filesystem::path& path, const VolumeData& data, dou
                   const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes);
 
 // Labels of the voxels, resampled if options.spacing_m is set. Calls `next` once for every slice.
+// `intensities` (may be null) receives those of the same voxels; it stays empty where they do not fit into
+// options.max_bytes.
 LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& data, const NextSlice& next,
-                         const VolumeFileOptions& options);
+                         const VolumeFileOptions& options, std::vector<float>* intensities = nullptr);
 
 VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next);
 

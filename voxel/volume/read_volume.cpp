@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "voxel/volume/check_header.h"
+#include "voxel/volume/intensity_volume.h"
 #include "voxel/volume/itk_adapter.h"
 #include "voxel/volume/length_unit.h"
 #include "voxel/volume/read_dicom.h"
@@ -256,15 +257,34 @@ VolumeHeader read_volume_header(const fs::path& path, const std::optional<double
                          : open_volume(path, unit_m).data.header;
 }
 
+namespace {
+
+IntensityVolume load_labels(const fs::path& path, const VolumeFileOptions& options, bool intensities,
+                            std::vector<std::string>* notes) {
+  check_options(path, options);
+  return with_slices(
+      path, options.unit_m, options.spacing_m, options.max_bytes,
+      [&](const VolumeData& data, const NextSlice& next) {
+        if (notes != nullptr) *notes = data.header.notes;
+        IntensityVolume volume;
+        volume.whole_numbers = data.component != Component::float32 && data.component != Component::float64;
+        volume.labels = in_words(path, "the voxels cannot be labelled", kDamaged, [&] {
+          return label_voxels(path, data, next, options, intensities ? &volume.intensities : nullptr);
+        });
+        return volume;
+      });
+}
+
+}  // namespace
+
 LabelVolume load_volume(const fs::path& path, const VolumeFileOptions& options,
                         std::vector<std::string>* notes) {
-  check_options(path, options);
-  return with_slices(path, options.unit_m, options.spacing_m, options.max_bytes,
-                     [&](const VolumeData& data, const NextSlice& next) {
-                       if (notes != nullptr) *notes = data.header.notes;
-                       return in_words(path, "the voxels cannot be labelled", kDamaged,
-                                       [&] { return label_voxels(path, data, next, options); });
-                     });
+  return load_labels(path, options, false, notes).labels;
+}
+
+IntensityVolume load_intensities(const fs::path& path, const VolumeFileOptions& options,
+                                 std::vector<std::string>* notes) {
+  return load_labels(path, options, true, notes);
 }
 
 VolumeStatistics read_volume_statistics(const fs::path& path, std::uint64_t max_bytes) {

@@ -70,6 +70,50 @@ TEST(ClassicSurface, ASheetFlipsTheForceInItsMiddle) {
   EXPECT_EQ(on(*sheet, glm::dvec3(0.0)).force_N, glm::dvec3(0.0));
 }
 
+// Points on the surface of a solid, and its outward normals there.
+struct OnSurface {
+  glm::dvec3 point, normal;
+};
+
+void expect_the_limit_from_either_side(const polygon::RigidSurface& surface, const OnSurface& at) {
+  const hybrid::Pose pose{.position_m = {0.3, -0.1, 0.2},
+                          .rotation = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1.0, 2.0, 3.0)))};
+  const auto force = [&](double height_m, const hybrid::Pose& where) {
+    const glm::dvec3 device = at.point + height_m * at.normal;
+    return on(surface, where.position_m + where.rotation * device, where).force_N;
+  };
+  constexpr double kHeight_m = 1e-8;
+  // The force changes by K times the height, and its direction by the rounding of the height: 1e-16 m of
+  // 1e-8.
+  constexpr double kSlack_N = 2.0 * kStiffness * kHeight_m;
+  for (const hybrid::Pose& where : {hybrid::Pose{}, pose}) {
+    const glm::dvec3 felt = force(0.0, where);
+    EXPECT_NEAR(glm::length(felt), kStiffness * kRadius, kSlack_N);
+    EXPECT_LT(glm::distance(felt, force(kHeight_m, where)), kSlack_N) << "from outside";
+    EXPECT_LT(glm::distance(felt, force(-kHeight_m, where)), kSlack_N) << "from inside";
+  }
+}
+
+TEST(ClassicSurface, OnASolidTheForceIsTheLimitFromEitherSide) {
+  const glm::dvec3 slanted = glm::normalize(glm::dvec3(1.0, 2.0, -3.0));
+  const glm::dvec3 across = glm::normalize(glm::dvec3(1.0, -0.3, 0.0));
+  const auto round = polygon::make_ball_surface(0.02);
+  expect_the_limit_from_either_side(*round, {0.02 * slanted, slanted});
+  const auto box = polygon::make_box_surface({0.03, 0.02, 0.01});
+  expect_the_limit_from_either_side(*box, {{7e-3, -3e-3, -0.01}, {0.0, 0.0, -1.0}});
+  expect_the_limit_from_either_side(*box, {{0.03, 1e-3, 2e-3}, {1.0, 0.0, 0.0}});
+  const auto capsule = polygon::make_capsule_surface(0.005, 0.03);
+  expect_the_limit_from_either_side(*capsule, {0.005 * across + glm::dvec3(0.0, 0.0, 0.021), across});
+  const polygon::TriangleMesh mesh = polygon::make_ball_mesh(0.02, 2);
+  const auto facets = polygon::make_mesh_surface(mesh, true);
+  for (std::size_t n = 0; n < mesh.triangles.size(); n += 37) {
+    const auto& t = mesh.triangles[n];
+    const glm::dvec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    expect_the_limit_from_either_side(
+        *facets, {0.2 * a + 0.3 * b + 0.5 * c, glm::normalize(glm::cross(b - a, c - a))});
+  }
+}
+
 class ProxyOrNot : public ::testing::Test {
  protected:
   void feel(const char* scene) {
@@ -132,8 +176,7 @@ TEST_F(ProxyOrNot, OverABallAllAgree) {
   scene.tool.stiffness_N_per_m = kStiffness;
   scene.rigid.push_back(
       {.name = "ball", .source = hybrid::BallPrimitive{0.02}, .pose = {}, .place = {}, .source_place = {}});
-  // Never on the surface itself, where the nearest one knows no side.
-  scene.path = device::PressPath{.from_m = {0.0, 0.0, 0.030013}, .to_m = {0.0, 0.0, 0.018}};
+  scene.path = device::PressPath{.from_m = {0.0, 0.0, 0.03}, .to_m = {0.0, 0.0, 0.018}};
   comparison_ = hybrid::compare_models(scene, "", {});
   EXPECT_EQ(comparison_.models[comparison_.reference].name, "rigid closed form");
   // Felt as a mesh: 2.4 N, turned by up to 2.6 degrees by its facets.

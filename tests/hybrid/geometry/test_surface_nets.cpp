@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <iostream>
@@ -15,6 +16,7 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "tests/hybrid/fixtures/label_volumes.h"
 
@@ -104,6 +106,117 @@ TEST(LabelSurface, BallKeepsItsVolumeAndRadiusWhenSmoothed) {
       EXPECT_LT(rms, passes < 5 ? 0.4 : 0.25) << radius << ' ' << passes;
     }
   }
+}
+
+// ---- surface_from_intensities
+
+// A ball as a scan has it: each voxel the mean over the scanner's blur, 1,000 inside and 0 outside.
+struct ScannedBall {
+  LabelVolume volume;
+  std::vector<float> intensities;
+  glm::dvec3 middle{0.0};
+};
+constexpr double kThreshold = 300.0;
+
+ScannedBall scanned_ball(double radius, const glm::dvec3& spacing, double noise_of, unsigned seed) {
+  const int n = static_cast<int>(std::ceil(2.0 * radius / std::min({spacing.x, spacing.y, spacing.z}))) + 8;
+  ScannedBall scan{
+      empty_volume(n, n, n, spacing), {}, 0.5 * (n - 1) * spacing + glm::dvec3(0.31, -0.17, 0.23)};
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise_now(0.0, 1.0);
+  for (int k = 0; k < n; ++k) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        // Linear within a spacing of where the intensity is the threshold, which is the surface.
+        const double depth = radius - glm::length(glm::dvec3(i, j, k) * spacing - scan.middle);
+        const double intensity =
+            std::clamp(kThreshold + 500.0 * depth, 0.0, 1000.0) + noise_of * noise_now(random);
+        scan.intensities.push_back(static_cast<float>(intensity));
+        if (scan.intensities.back() >= kThreshold) scan.volume.labels[scan.volume.index(i, j, k)] = 1;
+      }
+    }
+  }
+  return scan;
+}
+
+double rms_off_ball(const TriangleMesh& mesh, const ScannedBall& scan, double radius) {
+  double sum = 0.0;
+  for (const glm::dvec3& p : mesh.vertices) {
+    const double off = glm::length(p - scan.middle) - radius;
+    sum += off * off;
+  }
+  return std::sqrt(sum / static_cast<double>(mesh.vertices.size()));
+}
+
+// Smoothed labels are off by more than this bound.
+TEST(IntensitySurface, IsWithinATenthOfASpacingOfTheBall) {
+  constexpr double kAllowed = 0.1;
+  const auto infinite = std::numeric_limits<double>::infinity();
+  for (const double radius : {4.3, 10.0, 17.7}) {
+    for (const glm::dvec3& spacing : {glm::dvec3(1.0), glm::dvec3(1.0, 1.0, 1.5)}) {
+      const ScannedBall scan = scanned_ball(radius, spacing, 0.0, 1);
+      for (const int passes : {0, 10}) {
+        const TriangleMesh mesh =
+            hybrid::surface_from_intensities(scan.volume, {scan.intensities, kThreshold, infinite}, passes);
+        expect_manifold(mesh);
+        const double rms = rms_off_ball(mesh, scan, radius);
+        const double of_labels = rms_off_ball(hybrid::surface_from_labels(scan.volume, passes), scan, radius);
+        EXPECT_LT(rms, kAllowed) << radius << ' ' << spacing.z << ' ' << passes;
+        std::cout << "radius " << radius << ", " << spacing.z << " along z, " << passes << " passes: " << rms
+                  << " from intensities, " << of_labels << " from labels (spacings, rms)\n";
+      }
+    }
+  }
+}
+
+// Noise of a tenth of the step between bone and tissue, as in a scan of little dose.
+TEST(IntensitySurface, NoiseIsSmoothedAndTheBallStays) {
+  const ScannedBall scan = scanned_ball(10.0, glm::dvec3(1.0), 100.0, 3);
+  LabelVolume piece = scan.volume;
+  hybrid::keep_largest_piece(piece, true);
+  const TriangleMesh mesh = hybrid::surface_from_intensities(
+      piece, {scan.intensities, kThreshold, std::numeric_limits<double>::infinity()}, 10);
+  expect_manifold(mesh);
+  EXPECT_LT(rms_off_ball(mesh, scan, 10.0), 0.2);
+}
+
+// A range with two ends: a shell between two spheres, whose inner surface is where the upper end is passed.
+TEST(IntensitySurface, PassesTheEndOfTheRangeThatIsThere) {
+  ScannedBall scan = scanned_ball(10.0, glm::dvec3(1.0), 0.0, 1);
+  constexpr double kInner = 6.0;
+  for (std::size_t n = 0; n < scan.intensities.size(); ++n) {
+    const auto row = static_cast<std::size_t>(scan.volume.dims[0]);
+    const glm::dvec3 p(static_cast<double>(n % row), static_cast<double>(n / row % row),
+                       static_cast<double>(n / (row * row)));
+    const double depth = kInner - glm::length(p - scan.middle);
+    if (depth > -1.0) scan.intensities[n] = static_cast<float>(2000.0 + 500.0 * std::min(depth, 1.0));
+    scan.volume.labels[n] = scan.intensities[n] >= kThreshold && scan.intensities[n] <= 2000.0F ? 1 : 0;
+  }
+  const TriangleMesh mesh =
+      hybrid::surface_from_intensities(scan.volume, {scan.intensities, kThreshold, 2000.0}, 0);
+  expect_manifold(mesh);
+  for (const glm::dvec3& p : mesh.vertices) {
+    const double r = glm::length(p - scan.middle);
+    EXPECT_LT(std::min(std::abs(r - 10.0), std::abs(r - kInner)), 0.6) << r;
+  }
+}
+
+// A mask of two values is passed half way, as its labels are. So it is where intensities tell nothing.
+TEST(IntensitySurface, OfAMaskLiesHalfWay) {
+  const LabelVolume block = filled(empty_volume(9, 8, 7), [](int i, int j, int k) {
+    return i >= 2 && i <= 6 && j >= 3 && j <= 5 && k >= 1 && k <= 4;
+  });
+  const std::vector<float> mask(block.labels.begin(), block.labels.end());
+  const std::vector<float> nothing(block.labels.size(), 7.0F);  // all of it within the range
+  for (const hybrid::IntensityRange& range :
+       {hybrid::IntensityRange{mask, 0.5, 255.5}, hybrid::IntensityRange{nothing, 5.0, 9.0}}) {
+    const TriangleMesh mesh = hybrid::surface_from_intensities(block, range, 0);
+    expect_manifold(mesh);
+    glm::dvec3 low(9.0), high(0.0);
+    for (const glm::dvec3& p : mesh.vertices) low = glm::min(low, p), high = glm::max(high, p);
+    EXPECT_LT(glm::distance(low, {1.5, 2.5, 0.5}) + glm::distance(high, {6.5, 5.5, 4.5}), 1e-12);
+  }
+  EXPECT_NE(refusal([&] { (void)hybrid::surface_from_intensities(block, {{}, 5.0, 9.0}, 0); }), "");
 }
 
 TEST(LabelSurface, SmoothingKeepsEachVertexInItsCell) {

@@ -186,6 +186,9 @@ TEST_F(RecordingFile, WithoutEditsItIsAFileOfTheVersionBefore) {
   std::string wrong = bytes;
   wrong[wrong.size() - 12] = 99;  // the quantity
   EXPECT_NE(refusal_of(wrong).find("damaged edits"), std::string::npos);
+  recorded.edits = {{.tick = 7}, {.tick = 3}};  // a replay would apply the second one late
+  hybrid::save_recording(folder_ / "b.rec", recorded);
+  EXPECT_NE(refusal_of(read(folder_ / "b.rec")).find("damaged edits"), std::string::npos);
 }
 
 // A device that moves between the start of a session and its first tick, as happens if the first tick is
@@ -252,43 +255,6 @@ TEST_F(RecordingFile, TheShareOfWorkThatTicksHadIsOnRecord) {
   EXPECT_FALSE(hybrid::replay(recorded, {}).equal);
 }
 
-TEST(WorkShare, FollowsWhatTicksTake) {
-  hybrid::WorkShare share(1e-3);
-  const auto felt = [&share](int ticks, double tick_us, bool pressed) {
-    for (int n = 0; n < ticks; ++n) share.observe(tick_us, pressed);
-    return static_cast<int>(share.steps());
-  };
-  EXPECT_EQ(felt(1000, 390.0, true), 0);
-  // After a late tick the share falls at once, further the later the tick, but not below a third.
-  EXPECT_EQ(felt(1, 450.0, true), 1);
-  EXPECT_EQ(felt(1, 800.0, true), 3);
-  EXPECT_EQ(felt(100, 5000.0, true), hybrid::WorkShare::kMostSteps);
-  EXPECT_NEAR(hybrid::WorkShare::share(share.steps()), 0.354, 1e-3);
-  // The share rises slowly, only while tissue is pressed and only if time allows.
-  EXPECT_EQ(felt(10'000, 30.0, false), hybrid::WorkShare::kMostSteps);
-  EXPECT_EQ(felt(10'000, 350.0, true), hybrid::WorkShare::kMostSteps);
-  EXPECT_EQ(felt(59, 250.0, true), hybrid::WorkShare::kMostSteps);
-  EXPECT_EQ(felt(1, 250.0, true), hybrid::WorkShare::kMostSteps - 1);
-  EXPECT_EQ(felt(2000, 250.0, true), 0);
-}
-
-// On a machine whose ticks take as long as their work, the share does not oscillate: tick times stay in
-// between.
-TEST(WorkShare, ComesToRestOnAMachineOfAnySpeed) {
-  for (const double slow : {0.5, 1.0, 2.0, 2.5}) {
-    hybrid::WorkShare share(1e-3);
-    int late = 0;
-    for (int n = 0; n < 20'000; ++n) {
-      const double tick_us = slow * (100.0 + 250.0 * hybrid::WorkShare::share(share.steps()));
-      if (tick_us > 500.0) ++late;
-      share.observe(tick_us, true);
-    }
-    EXPECT_LE(late, 5) << slow;
-  }
-}
-
-// All state besides tissue: a body on a path and a free body, friction, shading, damping and a relief, on
-// meshes and primitives.
 TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
   polygon::save_ply(folder_ / "ball.ply", polygon::make_ball_mesh(0.02, 3));
   const std::string feel =
@@ -439,10 +405,17 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
     }
   }
   // Invalid time steps.
-  for (const double dt : {0.0, -1e-3, std::nan(""), HUGE_VAL}) {
+  for (const double dt : {0.0, -1e-3, std::nan(""), HUGE_VAL, 1e-310, 1e300}) {
     std::string wrong = bytes;
     std::memcpy(wrong.data() + 32, &dt, sizeof dt);
     EXPECT_NE(refusal_of(wrong), "") << dt;
+  }
+  // Values of a tick that no session writes: its fault and its share of work.
+  const std::size_t last_tick = bytes.size() - 48;
+  for (const std::size_t field : {std::size_t{32}, std::size_t{33}, std::size_t{36}, std::size_t{37}}) {
+    std::string wrong = bytes;
+    wrong[last_tick + field] = 77;
+    EXPECT_NE(refusal_of(wrong).find("damaged ticks"), std::string::npos) << "byte " << field;
   }
   EXPECT_THROW(hybrid::save_recording(folder_ / "no" / "folder" / "a.rec", {}), std::runtime_error);
 }

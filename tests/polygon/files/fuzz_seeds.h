@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Small meshes in every supported format, made in code, and mutations that damage them.
+// Small files in every format of a fuzzer (meshes here, made in code), and mutations that damage them.
 #pragma once
 
 #include <random>

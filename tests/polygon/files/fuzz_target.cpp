@@ -117,7 +117,7 @@ void must_keep(const TriangleMesh& before, const TriangleMesh& after) {
 
 }  // namespace
 
-FuzzOutcome fuzz_mesh_file(const std::filesystem::path& file) {
+FuzzOutcome fuzz_file(const std::filesystem::path& file) {
   FuzzOutcome outcome;
   MeshFile loaded;
   try {
@@ -133,7 +133,7 @@ FuzzOutcome fuzz_mesh_file(const std::filesystem::path& file) {
     return outcome;
   }
   outcome.loaded = true;
-  outcome.triangles = loaded.mesh.triangles.size();
+  outcome.size = loaded.mesh.triangles.size();
   must(!loaded.mesh.empty(), "a loaded mesh has triangles");
   must_be_sound(loaded.mesh);
   add(outcome.signature, loaded.findings);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes mesh files: fuzz_mesh --seconds N --seed S [--keep DIR] [FILE…]. Named files are tried unchanged,
-// and nothing else is done. Otherwise inputs are mutated in batches, each in its own process. An input that
+// Fuzzes files: PROGRAM --seconds N --seed S [--keep DIR] [--only .EXT] [FILE…]. Which ones, fuzz_seeds() and
+// fuzz_file() say, which each fuzzer has its own of. Named files are tried unchanged, and nothing else is
+// done. Otherwise inputs are mutated in batches, each in its own process. An input that
 // crashes, violates an invariant or takes too long is written to DIR, and the next batch continues. An input
 // with new behaviour (other findings, another error) joins the pool and is mutated further. The same seed
 // makes the same inputs. Build with sanitizers (preset asan), because memory errors show only there.
@@ -39,9 +40,9 @@ constexpr std::size_t kSlots = 1U << 16U;
 
 // Shared between the processes, so that it survives a crash.
 struct Shared {
-  std::uint64_t executions = 0, loaded = 0, triangles = 0;
+  std::uint64_t executions = 0, loaded = 0;
   double slowest_s = 0.0;
-  std::uint64_t slowest_bytes = 0, slowest_triangles = 0;
+  std::uint64_t slowest_bytes = 0, slowest_size = 0;
   std::uint64_t signatures = 0;
   char name[512] = {};  // of the current input
   bool seen[kSlots] = {};
@@ -70,16 +71,15 @@ struct Fuzzer {
     std::strncpy(shared->name, file.c_str(), sizeof(shared->name) - 1);
     ::alarm(kLimit_s);
     const double start_s = processor_s();
-    const tests::FuzzOutcome outcome = tests::fuzz_mesh_file(file);
+    const tests::FuzzOutcome outcome = tests::fuzz_file(file);
     const double took = processor_s() - start_s;
     ::alarm(0);
     ++shared->executions;
     shared->loaded += outcome.loaded ? 1 : 0;
-    shared->triangles += outcome.triangles;
     if (took > shared->slowest_s) {
       shared->slowest_s = took;
       shared->slowest_bytes = bytes.size();
-      shared->slowest_triangles = outcome.triangles;
+      shared->slowest_size = outcome.size;
       std::filesystem::copy_file(file, keep / ("slowest-" + name),
                                  std::filesystem::copy_options::overwrite_existing);
     }
@@ -117,7 +117,8 @@ struct Fuzzer {
   }
 };
 
-int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep) {
+// `only`: the extension of the seeds; empty: all.
+int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep, const std::string& only) {
   Fuzzer fuzzer;
   fuzzer.folder = std::filesystem::temp_directory_path() / ("hybrid-fuzz-" + std::to_string(::getpid()));
   fuzzer.keep = keep.empty() ? fuzzer.folder : keep;
@@ -127,6 +128,8 @@ int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep) 
   if (memory == MAP_FAILED) return 2;
   fuzzer.shared = new (memory) Shared;
   fuzzer.pool = tests::fuzz_seeds();
+  std::erase_if(fuzzer.pool, [&](const auto& input) { return !only.empty() && input.extension != only; });
+  if (fuzzer.pool.empty()) return 2;
   const std::size_t seeds = fuzzer.pool.size();
   const Clock::time_point start = Clock::now();
   double said_s = 0.0;
@@ -165,13 +168,12 @@ int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep) 
       said_s = now_s;
       const Shared& s = *fuzzer.shared;
       std::printf(
-          "%6.0f s: %llu inputs, %llu loaded, %llu triangles, %llu behaviours, %llu failures; slowest "
-          "%.2f s (%llu bytes, %llu triangles)\n",
+          "%6.0f s: %llu inputs, %llu loaded, %llu behaviours, %llu failures; slowest "
+          "%.2f s (%llu bytes, size %llu)\n",
           now_s, static_cast<unsigned long long>(s.executions), static_cast<unsigned long long>(s.loaded),
-          static_cast<unsigned long long>(s.triangles), static_cast<unsigned long long>(s.signatures),
-          static_cast<unsigned long long>(failures), s.slowest_s,
-          static_cast<unsigned long long>(s.slowest_bytes),
-          static_cast<unsigned long long>(s.slowest_triangles));
+          static_cast<unsigned long long>(s.signatures), static_cast<unsigned long long>(failures),
+          s.slowest_s, static_cast<unsigned long long>(s.slowest_bytes),
+          static_cast<unsigned long long>(s.slowest_size));
     }
     std::fflush(stdout);
   }
@@ -185,6 +187,7 @@ int main(int argc, char** argv) {
   double seconds = 10.0;
   std::uint64_t seed = 1;
   std::filesystem::path keep;
+  std::string only;
   bool named = false;
   for (int i = 1; i < argc; ++i) {
     const std::string option = argv[i];
@@ -193,14 +196,14 @@ int main(int argc, char** argv) {
       if (option == "--seconds") seconds = std::strtod(value, nullptr);
       if (option == "--seed") seed = std::strtoull(value, nullptr, 10);
       if (option == "--keep") keep = value;
+      if (option == "--only") only = value;
     } else {
       named = true;
       const Clock::time_point start = Clock::now();
-      const tests::FuzzOutcome outcome = tests::fuzz_mesh_file(option);
-      std::printf("%s: %s, %zu triangles, %.3f s, %s\n", option.c_str(),
-                  outcome.loaded ? "loaded" : "refused", outcome.triangles, seconds_since(start),
-                  outcome.signature.c_str());
+      const tests::FuzzOutcome outcome = tests::fuzz_file(option);
+      std::printf("%s: %s, size %zu, %.3f s, %s\n", option.c_str(), outcome.loaded ? "loaded" : "refused",
+                  outcome.size, seconds_since(start), outcome.signature.c_str());
     }
   }
-  return named ? 0 : fuzz(seconds, seed, keep);
+  return named ? 0 : fuzz(seconds, seed, keep, only);
 }

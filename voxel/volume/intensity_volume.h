@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Label volumes with the intensities that their labels come from, for surfaces between voxels.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "voxel/volume/read_volume.h"
+
+namespace voxel {
+
+struct IntensityVolume {
+  LabelVolume labels;
+  // Of each voxel of `labels`, in the file's own numbers; empty where they do not fit into the limit.
+  std::vector<float> intensities;
+  bool whole_numbers = false;  // the file holds whole numbers only
+};
+
+// As load_volume(), with the intensities where they fit into options.max_bytes. Throws VolumeError.
+IntensityVolume load_intensities(const std::filesystem::path& path, const VolumeFileOptions& options,
+                                 std::vector<std::string>* notes = nullptr);
+
+}  // namespace voxel
