@@ -85,8 +85,8 @@ Limit limit_of(const BorderLoop& loop, std::span<const glm::dvec3> points, Piece
   return large && !is_split_edge(loop, points) ? Limit::too_large : Limit::none;
 }
 
-// The edges of the fill: those inside the loop and those on it. Empty if an edge inside does not have exactly
-// two triangles, or coincides with an edge on the loop.
+// All edges of the fill's triangles. Empty unless each edge of the loop belongs to one triangle and each
+// other edge to two.
 std::vector<std::uint64_t> inner_edges(const BorderLoop& loop,
                                        const std::vector<TriangleIndices>& triangles) {
   std::vector<std::uint64_t> keys;

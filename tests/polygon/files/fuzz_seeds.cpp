@@ -134,7 +134,7 @@ std::vector<TriangleMesh> small_meshes() {
   TriangleMesh crossing = make_box_mesh(glm::dvec3(0.5), 1);
   append(crossing, make_box_mesh(glm::dvec3(0.5), 1), {0.3, 0.2, 0.1});
   meshes.push_back(crossing);
-  TriangleMesh soup;  // separate triangles: one missing, one repeated, one turned over
+  TriangleMesh soup;  // separate triangles of a closed mesh: one missing, one repeated, one turned over
   const TriangleMesh ball = make_ball_mesh(1.0, 1);
   for (std::size_t i = 1; i < ball.triangles.size(); ++i) {
     const TriangleIndices& t = ball.triangles[i];
@@ -200,7 +200,7 @@ class Mutator {
   }
 
  private:
-  // Writes special binary values at positions of values.
+  // Overwrites some bytes by a special binary value, or by bytes from elsewhere in the file.
   void word(std::string& bytes, std::size_t at) {
     static constexpr std::array<std::uint32_t, 12> kWords{0,           1,           3,           0x7fffffffU,
                                                           0x80000000U, 0xffffffffU, 0x7fc00000U, 0x7f800000U,
@@ -210,7 +210,7 @@ class Mutator {
     if (below(2) == 0) {
       const std::uint32_t value = kWords[below(kWords.size())];
       std::memcpy(bytes.data() + at, &value, 4);
-    } else {  // copies one vertex or facet over another
+    } else {  // copies 1 to 12 bytes to another place
       static constexpr std::array<std::size_t, 4> kLengths{1, 4, 8, 12};
       const std::size_t length = kLengths[below(4)];
       const std::string copy = bytes.substr(below(bytes.size() - length), length);
@@ -218,7 +218,8 @@ class Mutator {
     }
   }
 
-  // Removes, repeats or moves a line, which is a vertex or a face. The file stays well-formed.
+  // Removes a line, repeats it, or puts it in place of another. Most lines are vertices or faces, and each
+  // stays well-formed.
   void line(std::string& bytes) {
     const auto around = [&](std::size_t at) {
       const std::size_t before = bytes.rfind('\n', at == 0 ? 0 : at - 1);
@@ -272,7 +273,7 @@ class Mutator {
         text = bytes.substr(from, to - from);
         break;
       }
-      default: {  // a crack: changes the last digits
+      default: {  // changes the last digit, which may open a crack
         text = bytes.substr(begin, end - begin);
         if (!text.empty() && text.back() >= '0' && text.back() <= '9')
           text.back() = static_cast<char>('0' + below(10));
@@ -315,7 +316,7 @@ std::string packed_bytes(const std::string& bytes) {
   z_stream stream{};
   if (deflateInit2(&stream, 1, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) return {};
   std::string packed(deflateBound(&stream, static_cast<uLong>(bytes.size())) + 64, '\0');
-  std::string copy = bytes;  // zlib's input is not const
+  std::string copy = bytes;  // zlib takes its input as non-const
   stream.next_in = reinterpret_cast<Bytef*>(copy.data());
   stream.avail_in = static_cast<uInt>(copy.size());
   stream.next_out = reinterpret_cast<Bytef*>(packed.data());

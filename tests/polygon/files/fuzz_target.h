@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the fuzzers do with every file: load, check, repair, check again, touch. It aborts if an invariant is
-// violated.
+// The steps that the fuzzers do with every file: load, check, touch, repair, check and touch again.
 #pragma once
 
 #include <cstddef>
@@ -10,10 +9,10 @@
 namespace tests {
 
 struct FuzzOutcome {
-  bool loaded = false;        // false: MeshError
-  std::size_t triangles = 0;  // as loaded
+  bool loaded = false;        // false: the file was refused with a MeshError
+  std::size_t triangles = 0;  // number in the loaded mesh
   // Summary of the behaviour: ids of findings and repairs, or the error text without its numbers. Two inputs
-  // with the same signature test much the same.
+  // with the same signature test similar code.
   std::string signature;
 };
 
