@@ -61,6 +61,6 @@ struct FakeHd {
 // Exported functions:
 //   FakeHd* fake_hd()              write before the device is opened, read after it is closed
 //   void fake_hd_reset()           restores the initial state
-//   std::int64_t fake_hd_now_ns()  its clock
+//   std::int64_t fake_hd_now_ns()  the clock of the double
 // The environment variable FAKE_HD sets the same fields if no test can set them:
 // "paced=1,error=0x302,error_at=500".
