@@ -187,7 +187,7 @@ TEST(Vibration, OfTwoTonesTheOneThatIsFelt) {
   EXPECT_EQ(hybrid::strongest_vibration(std::vector<double>(5, 1.0), 1000.0).felt, 0.0);
 }
 
-// ---- around it ------------------------------------------------------------------------------------------
+// ---- the search, refusals and the report ------------------------------------------------------------
 
 TEST(FirstNotSo, IsTheLeastBoundaryOrNone) {
   const auto below = [](double limit) { return [limit](double x) { return x < limit; }; };
