@@ -269,7 +269,7 @@ TEST_F(Compose, WhatLiesFarAwayIsSaid) {
   EXPECT_THAT(all(composed.notes), HasSubstr("if the file is in meters"));
 }
 
-// ---- from nothing
+// ---- the starter scene
 
 TEST_F(Compose, TheStarterSceneRuns) {
   ComposeOptions options;
