@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What nearly every test includes. A source still names each header that it uses; this one only saves reading them again.
+// Precompiled header: the headers that nearly every test includes. A source still names each header that it
+// uses; this file only saves compiling them again.
 #pragma once
 
 #include <gtest/gtest.h>

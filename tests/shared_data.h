@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Public data sets beside the checkout, and Debian's sample volumes. Where one is missing, a test that needs
-// it says so and is skipped. It fails instead when HYBRID_EXPECT_DATA is set, as on machines that should have
-// the data.
+// Public data sets beside the checkout, and Debian's sample volumes. If data are missing, a test that needs
+// them is skipped and says so. On machines that should have the data, HYBRID_EXPECT_DATA is set, and then the
+// test fails instead.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ inline bool data_are_expected() {
 
 }  // namespace tests
 
-// In a test: returns when the data are missing, failed or skipped.
+// For use in a test. If the data are missing, the test returns, marked as failed or skipped.
 #define NEED_DATA(there, what_is_missing)                                                \
   do {                                                                                   \
     if (!(there) && tests::data_are_expected())                                          \

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The source tree as text, for tests that hold rules of it.
+// The source tree as text, for tests that check rules of the sources.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ inline bool is_in(const SourceFile& file, std::string_view folder) {
   return file.path.starts_with(std::string(folder).append("/"));
 }
 
-// Everything a person wrote: sources, build files, scripts, scenes and documents. Data are left out.
+// Whether a person wrote the file: sources, build files, scripts, scenes and documents. Data are left out.
 inline bool is_text(const std::filesystem::path& file) {
   static const std::set<std::string> kEndings{".cpp",  ".h",   ".hpp",  ".cmake", ".sh",  ".md",
                                               ".toml", ".txt", ".json", ".yml",   ".yaml"};

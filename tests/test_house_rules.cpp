@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads the source tree and holds the rules that keep its parts apart. A rule that is broken names file and
-// line.
+// Reads the source tree and checks the rules that keep its parts separate. A violated rule is reported with
+// its file and line.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using namespace tests;
 constexpr std::array kParts{"polygon", "voxel", "device", "hybrid"};
 constexpr std::array kFolders{"polygon", "voxel", "device", "hybrid", "scenes", "tests"};
 
-// What a line includes; empty when it is no #include.
+// The file that a line includes; empty if the line is not an #include.
 std::string included_by(std::string_view line) {
   const auto skip = [&](std::string_view word) {
     line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
@@ -36,7 +36,7 @@ std::string included_by(std::string_view line) {
   return std::string(line.substr(0, line.find_first_of(">\"")));
 }
 
-// Calls found(file, line index, what is included) for each #include.
+// Calls found(file, line index, included file) for each #include.
 template <typename Found>
 void for_each_include(const Found& found) {
   for (const SourceFile& file : tree()) {
@@ -81,11 +81,11 @@ TEST(HouseRules, PolygonVoxelAndDeviceKnowNothingOfOneAnotherNorOfHybrid) {
   });
 }
 
-// ---- Rooms: the folders of a part, and the rooms that each of them may include. ----
+// ---- Rooms are the folders of a part. A room may include only certain others. ----
 
 struct Room {
   const char* name;
-  std::vector<const char*> below;  // rooms that it may include; theirs count as well
+  std::vector<const char*> below;  // rooms that this room may include, and all rooms that those may include
 };
 
 const std::map<std::string, std::vector<Room>>& rooms() {
@@ -139,7 +139,8 @@ const std::map<std::string, std::vector<Room>>& rooms() {
   return kRooms;
 }
 
-// "hybrid" and "tick/proxy" of "hybrid/tick/proxy/name.h"; empty where the path is not of a part.
+// Part and room of a path: "hybrid" and "tick/proxy" for "hybrid/tick/proxy/name.h". Both are empty if the
+// path belongs to no part.
 std::pair<std::string, std::string> room_of(const std::string& path) {
   const std::size_t first = path.find('/'), last = path.rfind('/');
   if (first == std::string::npos || !rooms().contains(path.substr(0, first))) return {};
@@ -221,7 +222,7 @@ TEST(HouseRules, NoPartIncludesATest) {
   });
 }
 
-// A library that is seen in two files can be replaced; one that is seen in a header is everywhere.
+// A library that only two files include can be replaced. A library that a header includes is everywhere.
 TEST(HouseRules, HeavyLibrariesStayInFewFilesAndOutOfHeaders) {
   const std::array kHeavy{"CGAL/", "embree3/", "OpenMesh/",  "itk",        "gdcm",
                           "GLFW/", "imgui",    "epoxy/gl.h", "epoxy/egl.h"};
@@ -237,8 +238,8 @@ TEST(HouseRules, HeavyLibrariesStayInFewFilesAndOutOfHeaders) {
   for (const auto& [library, files] : users) {
     std::string list;
     for (const std::string& file : files) list += "\n  " + file;
-    // CGAL also is what others are measured against: the exact reference, and the tree that people use.
-    // ImGui draws the text of pictures and the window's panel, in two rooms.
+    // CGAL may be in more files, because it also serves as the exact reference and as the tree in common use.
+    // ImGui is in two rooms: it draws the text of pictures and the window's panel.
     const std::size_t most = library == "CGAL/" ? 5 : library == "imgui" ? 3 : 2;
     EXPECT_LE(files.size(), most) << library << " is included in more than " << most << " files:" << list;
   }
@@ -260,7 +261,7 @@ TEST(HouseRules, EverySourceFileNamesItsLicence) {
 }
 
 TEST(HouseRules, NoTextNamesAPlaceOnSomeonesMachine) {
-  // Put together from halves, so that this file does not name them either.
+  // The words are joined from halves, so that this file does not contain them.
   const std::array<std::string, 3> kForbidden{
       std::string("/wo").append("rk/"), std::string("/ho").append("me/"), std::string("/Use").append("rs/")};
   for (const SourceFile& file : tree()) {

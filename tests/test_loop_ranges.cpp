@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads the source tree and finds loops over a part of a temporary: `for (x : f()->list())`, where f()
-// returns a pointer that owns. g++ 12 and clang 14 do not warn of it.
+// returns an owning pointer. g++ 12 and clang 14 do not warn about such loops.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -19,8 +19,8 @@ bool is_word(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
 }
 
-// The name of the call that ends before `end` ("at" of "rooms().at(part)"), and where it begins; npos: no
-// call does.
+// Finds the call that ends before `end`, such as "at" in "rooms().at(part)". Stores its name and returns
+// where the name begins. Returns npos if no call ends there.
 std::size_t call_before(std::string_view text, std::size_t end, std::string& name) {
   if (end == 0 || text[end - 1] != ')') return std::string_view::npos;
   std::size_t open = end - 1;
@@ -29,7 +29,8 @@ std::size_t call_before(std::string_view text, std::size_t end, std::string& nam
     if (text[open] == ')') ++depth;
     if (text[open] == '(') --depth;
   }
-  if (open > 0 && text[open - 1] == '>') open = text.rfind('<', open);  // std::make_unique<int>(3)
+  if (open > 0 && text[open - 1] == '>')
+    open = text.rfind('<', open);  // for example std::make_unique<int>(3)
   if (open == std::string_view::npos) return open;
   std::size_t begin = open;
   while (begin > 0 && is_word(text[begin - 1])) --begin;
@@ -60,11 +61,12 @@ const std::set<std::string>& names_of_what_stays() {
   return names;
 }
 
-// The call in the range of a range-for whose result is gone before the loop begins; empty: there is none.
-// C++20 keeps the range alive, but not a temporary that the range is a part of, as in f()->notes().
+// In the range of a range-for, finds a call whose result is destroyed before the loop begins. Empty if there
+// is none. C++20 keeps the range itself alive, but not a temporary that contains the range, as in
+// f()->notes().
 std::string lost_call(std::string_view range) {
   std::size_t end = range.size();
-  bool reached_through = range.starts_with("*");  // by an arrow, a star, or a call on it
+  bool reached_through = range.starts_with("*");  // the result is used by an arrow, a star or a member call
   std::string name;
   while (end > 0) {
     const std::size_t begin = call_before(range, end, name);
@@ -87,7 +89,7 @@ std::string lost_call(std::string_view range) {
   return "";
 }
 
-// The range of a range-for that begins at `at`; empty where it is another loop.
+// The range of the range-for that begins at `at`; empty if it is another kind of loop.
 std::string range_at(const SourceFile& file, std::size_t line, std::size_t at) {
   std::string text = file.lines[line].substr(at);
   for (std::size_t more = 1; more < 4 && line + more < file.lines.size(); ++more)

@@ -26,8 +26,8 @@ std::string too_large(std::uint64_t max_bytes) {
          " bytes; simplify the mesh, or raise max_bytes when the memory is there";
 }
 
-// Unpacked size that a gzip file announces in its last four bytes (RFC 1952), limited by what deflate can
-// achieve. It is only a hint.
+// Unpacked size that a gzip file announces in its last four bytes (RFC 1952), limited by the largest ratio of
+// deflate. It is only a hint.
 std::uint64_t announced_size(const std::filesystem::path& file) {
   constexpr std::uint64_t kMostPacked = 1032;  // largest ratio that deflate reaches
   std::ifstream in(file, std::ios::binary | std::ios::ate);

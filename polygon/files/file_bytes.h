@@ -9,14 +9,15 @@
 
 namespace polygon {
 
-// How a file that begins with these bytes (64 are enough) is something else than data, and the remedy; empty
-// for data. Git LFS leaves pointers in place of files that were not fetched, and servers send pages.
+// Says, for a message, why a file that begins with these bytes is no data file, and what to do. 64 bytes are
+// enough. Empty for a data file. Git LFS leaves pointers in place of files that were not fetched. Servers may
+// send a web page instead of a file.
 std::string_view other_kind(std::string_view first_bytes);
 
 // `packed`: the file must be gzip. Throws MeshError if the file is missing, not a regular file, unreadable,
 // damaged, or larger than max_bytes. The limit holds for the size on disk and for the unpacked size, and is
-// checked before more memory is taken. A file that is something else than its name says is told for what it
-// is (other_kind()).
+// checked before more memory is taken. The message for a file that is not data names its real kind
+// (other_kind()).
 std::string read_file_bytes(const std::filesystem::path& file, bool packed, std::uint64_t max_bytes);
 
 }  // namespace polygon

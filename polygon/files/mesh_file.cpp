@@ -23,8 +23,8 @@ namespace {
 
 namespace io = OpenMesh::IO;
 
-// Collects the points and faces that OpenMesh reads as a soup, because OpenMesh's own meshes lose
-// non-manifold faces. Everything else in a file is ignored.
+// Collects the points and faces that OpenMesh reads, as a soup. OpenMesh's own meshes would lose non-manifold
+// faces. Everything else in a file is ignored.
 class SoupImporter final : public io::BaseImporter {
  public:
   // `keeps_points` = false: points are only counted, because the prescan keeps them as doubles.
@@ -33,8 +33,9 @@ class SoupImporter final : public io::BaseImporter {
     face_begin.reserve(faces + 1);
   }
   std::vector<glm::dvec3> points;
-  std::vector<std::uint32_t> corners;        // of all faces, concatenated
-  std::vector<std::uint32_t> face_begin{0};  // start of each face's corners, then the end
+  std::vector<std::uint32_t> corners;  // of all faces, concatenated
+  std::vector<std::uint32_t> face_begin{
+      0};  // [face] where its corners start; the last entry is the end of all
 
   using VH = OpenMesh::VertexHandle;
   using HH = OpenMesh::HalfedgeHandle;
@@ -49,7 +50,7 @@ class SoupImporter final : public io::BaseImporter {
   VH add_vertex() override { return add_vertex(OpenMesh::Vec3f(0.0F, 0.0F, 0.0F)); }
   FH add_face(const VHandles& indices) override {
     for (const VH& v : indices)
-      corners.push_back(static_cast<std::uint32_t>(v.idx()));  // -1 is out of any range
+      corners.push_back(static_cast<std::uint32_t>(v.idx()));  // as an unsigned index, -1 is out of any range
     face_begin.push_back(static_cast<std::uint32_t>(corners.size()));
     return FH(static_cast<int>(face_begin.size()) - 2);
   }
@@ -101,7 +102,7 @@ class SoupImporter final : public io::BaseImporter {
   std::size_t vertices_ = 0;
 };
 
-// A stream over bytes in memory that does not copy them. It can seek, as OpenMesh's readers may.
+// A stream buffer over bytes in memory, without a copy. It can seek, because OpenMesh's readers may do so.
 class MemoryBuffer final : public std::streambuf {
  public:
   explicit MemoryBuffer(std::string& bytes) { setg(bytes.data(), bytes.data(), bytes.data() + bytes.size()); }
@@ -156,7 +157,7 @@ void report(std::vector<Finding>& findings, const char* id, Severity severity, s
 MeshFile assemble(PrescannedFile& prescanned, SoupImporter& soup, double scale) {
   MeshFile result;
   std::vector<glm::dvec3>& vertices = result.mesh.vertices;
-  // STL: vertices welded by OpenMesh, floats.
+  // For STL, the vertices are the floats that OpenMesh has welded.
   vertices.swap(prescanned.binary ? soup.points : prescanned.coordinates);
   std::vector<bool> usable(vertices.size());
   std::size_t unusable_vertices = 0;

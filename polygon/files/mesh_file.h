@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads mesh files, and writes PLY (write_mesh.h writes other formats, and to streams). This is the only part
-// of the project that knows OpenMesh. Every file is prescanned first (prescan.h), and nothing that is left
-// out goes unreported.
+// Reads mesh files, and writes PLY files. write_mesh.h writes other formats and to streams. This is the only
+// part of the project that knows OpenMesh. Every file is prescanned first (prescan.h). Everything that is
+// left out is reported.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class MeshError : public std::runtime_error {
 
 struct MeshFileOptions {
   double scale = 1.0;  // meters per file unit, e.g. 0.001 for mm
-  // Larger files are refused before memory is taken.
+  // Larger files are refused before memory is taken for them.
   std::uint64_t max_bytes = 4ULL * 1024 * 1024 * 1024;
 };
 
@@ -36,7 +36,8 @@ struct MeshFile {
 // max_bytes.
 MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& options = {});
 
-// Writes PLY, binary, coordinates in meters, whole or not at all: beside its name first. Throws MeshError.
+// Writes binary PLY, with coordinates in meters. The file is written under a temporary name beside `file` and
+// then renamed, so `file` is never incomplete. Throws MeshError.
 void save_ply(const std::filesystem::path& file, const TriangleMesh& mesh);
 
 }  // namespace polygon

@@ -25,7 +25,7 @@ std::string at_line(std::size_t line) {
   return "line " + std::to_string(line);
 }
 
-// A word of the file for a message: shortened and printable.
+// A word of the file, shortened and made printable for a message.
 std::string quoted(std::string_view word) {
   std::string text = "'";
   for (const char c : word.substr(0, 24)) text += (c >= ' ' && c < 127) ? c : '?';
@@ -49,7 +49,7 @@ glm::dvec3 take_coordinates(const std::filesystem::path& file, std::string_view&
 
 // ---- OBJ
 
-// One line, joined with the lines that a '\' at its end continues. `joined` holds the text if there are any.
+// One line. If it ends with '\', the lines that continue it are appended, and `joined` holds the whole text.
 std::string_view logical_line(TextCursor& text, std::string& joined) {
   std::string_view line = text.next_line();
   if (!line.ends_with('\\')) return line;
@@ -69,7 +69,7 @@ PrescannedFile prescan_obj(const std::filesystem::path& file, std::span<char> ra
   const std::string_view bytes = plain_text(file, raw);
   PrescannedFile prescanned;
   std::string joined;
-  // First pass: vertices, because a face may use vertices that come later in the file.
+  // The first pass reads the vertices, because a face may use vertices that come later in the file.
   for (TextCursor text(bytes); !text.at_end();) {
     const std::size_t number = text.line();
     std::string_view line = logical_line(text, joined);
@@ -80,15 +80,15 @@ PrescannedFile prescan_obj(const std::filesystem::path& file, std::span<char> ra
   if (vertices >= kMostElements) refuse_mesh(file, "has more than 2^31 - 1 vertices; split it");
 
   std::int64_t so_far = 0;  // vertices so far; negative indices count back from here
-  // OpenMesh's OBJ reader drops faces with repeated corners, also those that a cut to a hole runs along
-  // twice. So the faces are passed on as PLY.
+  // OpenMesh's OBJ reader drops faces with repeated corners, even if a polygon only repeats them where a cut
+  // connects its rim to a hole. So the faces are passed on as PLY.
   std::string faces;
   for (TextCursor text(bytes); !text.at_end();) {
     const std::size_t number = text.line();
     std::string_view line = logical_line(text, joined);
     const std::string_view keyword = take_word(line);
     if (keyword == "v") ++so_far;
-    if (keyword != "f" && keyword != "fo") continue;  // fo: the same, in files of the nineties
+    if (keyword != "f" && keyword != "fo") continue;  // 'fo' is an older keyword for 'f'
     const std::size_t face_at = faces.size();
     append_raw(faces, std::int32_t{0});
     std::int32_t corners = 0;
@@ -140,7 +140,7 @@ PrescannedFile prescan_off(const std::filesystem::path& file, std::span<char> ra
   std::string_view kind = take_word(line);
   if (!kind.ends_with("OFF")) refuse_mesh(file, "does not begin with 'OFF'; is it another kind of file?");
   kind.remove_suffix(3);
-  // Texture, colour, normal: they follow the coordinates.
+  // Texture, colour and normal prefixes are harmless: these values follow the coordinates.
   for (const std::string_view extra : {"ST", "C", "N"}) {
     if (kind.starts_with(extra)) kind.remove_prefix(extra.size());
   }
@@ -233,7 +233,8 @@ void begin_stl(PrescannedFile& prescanned) {
   prescanned.dialect.assign(kStlHeader, '\0');
 }
 
-// OpenMesh welds corners in a search tree that a NaN would break, so such facets are not passed on.
+// OpenMesh welds corners in a search tree. A NaN would break its order, so facets with unusable corners are
+// not passed on.
 void add_facet(PrescannedFile& prescanned, const std::array<glm::dvec3, 3>& corners,
                const std::string& place) {
   if (!std::all_of(corners.begin(), corners.end(), is_usable)) {

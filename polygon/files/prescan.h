@@ -3,8 +3,8 @@
 // for announced counts, read lists past the file's end, shift all later indices after an unreadable number,
 // and round coordinates to floats. They also misread whole dialects silently: double or 16-bit PLY
 // properties, unknown lists, comments in OFF, '\' in OBJ. The prescan walks the file once, rewrites it into
-// the one dialect of its format that OpenMesh reads correctly, and keeps the coordinates as doubles, in order
-// of the vertices.
+// the one dialect of its format that OpenMesh reads correctly, and keeps the coordinates as doubles, in the
+// order of the vertices.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +22,10 @@ enum class MeshFormat : std::uint8_t { obj, ply, stl, off };
 struct PrescannedFile {
   std::string dialect;                  // the rewritten file, for OpenMesh
   const char* openmesh_extension = "";  // selects OpenMesh's reader
-  bool binary = false;                  // OpenMesh's STL reader has to be told
-  // (file units) one per vertex; empty for STL, which holds floats.
+  bool binary = false;                  // for OpenMesh's STL reader, which must be told
+  // One per vertex, in file units. Empty for STL, whose vertices come from OpenMesh as floats.
   std::vector<glm::dvec3> coordinates;
-  std::size_t faces = 0;  // number that OpenMesh must find
+  std::size_t faces = 0;  // number of faces that OpenMesh must find
   // OpenMesh's STL reader drops facets with repeated corners.
   bool may_drop = false;
   std::size_t short_faces = 0;        // faces left out: fewer than three corners
@@ -35,8 +35,8 @@ struct PrescannedFile {
   std::size_t trailing_bytes = 0;     // bytes after the end of a binary file
 };
 
-// Throw MeshError for a malformed or truncated file, with the line or byte. `bytes` of a text are brought to
-// one form of line ends in place.
+// Prescans one format each. Throws MeshError for a malformed or truncated file, with the line or byte. In a
+// text file the line ends are made uniform, in `bytes` itself.
 PrescannedFile prescan_obj(const std::filesystem::path& file, std::span<char> bytes);
 PrescannedFile prescan_ply(const std::filesystem::path& file, std::span<char> bytes);
 PrescannedFile prescan_stl(const std::filesystem::path& file, std::span<char> bytes);
@@ -46,16 +46,16 @@ PrescannedFile prescan_off(const std::filesystem::path& file, std::span<char> by
 
 [[noreturn]] void refuse_mesh(const std::filesystem::path& file, const std::string& what_and_remedy);
 
-// Without the mark of UTF-8 at the start.
+// The text without the byte-order mark of UTF-8 at its start.
 [[nodiscard]] std::string_view without_byte_order_mark(std::string_view text);
-// A text without the byte-order mark at its start, and with "\n" where a line ends with "\r" alone. Lines
-// keep their numbers. Refuses UTF-16.
+// The bytes as a text without the byte-order mark. A line end "\r" alone is replaced by "\n" in `bytes`, so
+// lines keep their numbers. Refuses UTF-16.
 [[nodiscard]] std::string_view plain_text(const std::filesystem::path& file, std::span<char> bytes);
-// Does the same with the line ends alone.
+// Replaces each line end "\r" alone by "\n", in place.
 void mend_line_ends(std::span<char> text);
 
-// Begins a binary PLY, the dialect in which OpenMesh reads the faces and counts the vertices; one byte stands
-// for each. `faces`: of each face the number of corners, then their indices, as 32-bit integers.
+// Writes the dialect as a binary PLY. OpenMesh reads its faces, and only counts its vertices: each vertex is
+// one byte. `faces` holds, for each face, the number of corners and then their indices, as 32-bit integers.
 void write_ply_dialect(PrescannedFile& prescanned, const std::string& faces);
 
 // The words of a text, separated by white space, and the line on which they stand.

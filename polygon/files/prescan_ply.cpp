@@ -71,9 +71,8 @@ bool is_integer(Scalar type) {
   return type != Scalar::float32 && type != Scalar::float64;
 }
 
-// Where the body begins; the end of the file if there is no 'end_header'. Where the lines of the header end
-// with
-// '\r' alone, a '\n' after its last one belongs to the body.
+// Offset at which the body begins, or the size of the file if there is no 'end_header'. If the header's lines
+// end with '\r' alone, a '\n' after the last '\r' belongs to the body.
 std::size_t header_end(std::string_view bytes) {
   constexpr std::string_view kLast = "end_header";
   const std::size_t last = bytes.find(kLast);
@@ -144,7 +143,7 @@ Header read_header(const std::filesystem::path& file, TextCursor& text) {
   return header;
 }
 
-// The values of the body in sequence, never read past its end.
+// Reads the values of the body in sequence, never past its end.
 class Body {
  public:
   Body(const std::filesystem::path& file, Encoding encoding, std::string_view bytes, std::size_t line)
@@ -192,7 +191,7 @@ class Body {
 
   std::int64_t integer(Scalar type) {
     const double value = number(type);
-    // Every 32-bit integer is exact in a double; in a text any number may stand here.
+    // Every 32-bit integer is exact in a double. A text may hold any number here, so the range is checked.
     if (!(value >= -9e15 && value <= 9e15)) return -1;
     return static_cast<std::int64_t>(value);
   }
@@ -208,7 +207,7 @@ class Body {
     }
   }
 
-  // Checked against the rest of the file before it is used.
+  // The length is checked against the rest of the file before it is used.
   std::int64_t list_length(const Property& property) {
     const std::int64_t length = integer(property.count);
     if (length < 0 || static_cast<std::uint64_t>(length) > remaining() / least_bytes(property.value) + 1) {
@@ -254,7 +253,7 @@ class Body {
 };
 
 void read_vertices(const Element& element, Body& body, std::vector<glm::dvec3>& coordinates) {
-  // [property] coordinate 0 to 2, or -1.
+  // [property] which coordinate it is, 0 to 2; -1 if it is none.
   std::vector<int> axis(element.properties.size(), -1);
   for (std::size_t p = 0; p < axis.size(); ++p) {
     const Property& property = element.properties[p];
@@ -282,8 +281,8 @@ bool holds_corners(const Property& property) {
 }
 
 void read_faces(const Element& element, Body& body, std::string& faces, PrescannedFile& prescanned) {
-  // Room for triangles, the usual case. The count has been checked, but in a text it may still be far too
-  // large, so no more than twice the rest of the file is reserved.
+  // Reserves room for triangles, the usual case. The count has been checked, but in a text file it may still
+  // be far too large. So at most twice the rest of the file is reserved.
   constexpr std::size_t kTriangle = 4 * sizeof(std::int32_t);
   faces.reserve(std::min(element.count * kTriangle, 2 * body.remaining()));
   for (std::uint64_t i = 0; i < element.count; ++i) {

@@ -41,7 +41,7 @@ class Pieces {
   std::string bytes_;
 };
 
-// Shortest digits that give the same number again, without a locale.
+// The shortest digits that read back as the same number, whatever the locale.
 template <typename Number>
 void append_digits(std::string& text, Number number) {
   std::array<char, 32> digits{};
@@ -52,7 +52,7 @@ void append_digits(std::string& text, Number number) {
 
 void write_ply(const TriangleMesh& mesh, const ByteSink& sink) {
   Pieces out(sink);
-  // Written here as doubles; OpenMesh would write floats.
+  // Writes doubles; OpenMesh would write floats.
   out.bytes() = "ply\nformat binary_little_endian 1.0\ncomment coordinates in meters\nelement vertex " +
                 std::to_string(mesh.vertices.size()) +
                 "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
@@ -76,7 +76,8 @@ void write_stl_in_mm(const TriangleMesh& mesh, const ByteSink& sink) {
     throw std::length_error("STL cannot count " + std::to_string(mesh.triangles.size()) +
                             " triangles; write PLY");
   Pieces out(sink);
-  out.bytes() = "binary STL, coordinates in millimeters";  // must not begin with "solid", as text does
+  out.bytes() =
+      "binary STL, coordinates in millimeters";  // must not begin with "solid", which marks a text STL
   out.bytes().resize(kHeaderBytes, ' ');
   append_raw(out.bytes(), static_cast<std::uint32_t>(mesh.triangles.size()));
   const auto append = [&out](const glm::dvec3& v) {
@@ -122,7 +123,8 @@ void save_ply(const std::filesystem::path& file, const TriangleMesh& mesh) {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  const bool beside = !fs::exists(status) || fs::is_regular_file(status);  // a device has no other name
+  const bool beside =
+      !fs::exists(status) || fs::is_regular_file(status);  // a device file is written directly
   const fs::path to = beside ? fs::path(file.string() + ".part" + std::to_string(getpid())) : file;
   std::ofstream out(to, std::ios::binary);
   if (!out)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes meshes as bytes, to wherever the caller puts them: all but the format is the caller's.
+// Writes meshes as bytes in a file format. The caller's sink decides where the bytes go.
 #pragma once
 
 #include <functional>
@@ -11,12 +11,12 @@ namespace polygon {
 
 using ByteSink = std::function<void(std::string_view bytes)>;
 
-// PLY, binary, doubles in meters.
+// Writes binary PLY, with doubles in meters.
 void write_ply(const TriangleMesh& mesh, const ByteSink& sink);
-// STL, binary, floats in millimeters; it has no unit of its own, so the header says it. Throws
-// std::length_error: more triangles than it can count (2^32 - 1).
+// Writes binary STL, with floats in millimeters. STL has no unit of its own, so the header's text states it.
+// Throws std::length_error for more than 2^32 - 1 triangles, the most that STL can count.
 void write_stl_in_mm(const TriangleMesh& mesh, const ByteSink& sink);
-// OBJ, text, in millimeters, with all digits of a double; a comment says the unit.
+// Writes OBJ text in millimeters, with all digits of a double. A comment states the unit.
 void write_obj_in_mm(const TriangleMesh& mesh, const ByteSink& sink);
 
 }  // namespace polygon

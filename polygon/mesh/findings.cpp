@@ -9,7 +9,7 @@ namespace polygon {
 std::string point_in_words(const glm::dvec3& p) {
   std::ostringstream text;
   text.precision(7);
-  text << '(' << p.x + 0.0 << ", " << p.y + 0.0 << ", " << p.z + 0.0 << ") m";  // + 0.0: no "-0"
+  text << '(' << p.x + 0.0 << ", " << p.y + 0.0 << ", " << p.z + 0.0 << ") m";  // + 0.0 avoids "-0"
   return text.str();
 }
 

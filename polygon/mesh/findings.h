@@ -24,8 +24,8 @@ struct FindingTally {
   void add(const glm::dvec3& where, std::optional<std::uint32_t> triangle = std::nullopt);
 };
 
-// Appends the finding, with its place in the text too. Does nothing when the tally's count is 0. `text` reads
-// as the continuation of the count.
+// Appends the finding, and adds its place to its text. Does nothing if the tally's count is 0. `text`
+// continues the count, as "edges are open" continues "3".
 void add_finding(std::vector<Finding>& findings, const char* id, Severity severity, const FindingTally& found,
                  const std::string& text);
 

@@ -31,7 +31,7 @@ enum class Severity : std::uint8_t { info, warning, error };
 struct FindingPlace {
   glm::dvec3 first_m{0.0};                  // centre of the first triangle, edge, vertex or loop
   glm::dvec3 lower_m{0.0}, upper_m{0.0};    // box around the centres of all of them
-  std::optional<std::uint32_t> triangle{};  // index of the first one in the mesh as given
+  std::optional<std::uint32_t> triangle{};  // the triangle at the first place; index in the mesh as given
 };
 
 // One finding of a check or a loader, with a text that a person can act on.

@@ -59,7 +59,7 @@ bool winds_around(const TriangleMesh& mesh, const glm::dvec3& point) noexcept {
     half_angle += std::atan2(glm::dot(a, glm::cross(b, c)),
                              la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb);
   }
-  return half_angle > std::numbers::pi;  // half of the full 2π
+  return half_angle > std::numbers::pi;  // the sum is 2π inside and 0 outside
 }
 
 }  // namespace polygon

@@ -2,8 +2,8 @@
 #pragma once
 
 // Compiles a function for two vector widths; the loader picks one when the program starts. Both give the same
-// bits, because the operations are element-wise and contraction is off. The start-up of sanitizers does not
-// support ifunc resolvers, so there the build names the one width that its machine has
+// bits, because the operations are element-wise and contraction is off. Sanitizers do not support ifunc
+// resolvers at start-up. So a sanitizer build selects the single width of its machine
 // (cmake/HybridTarget.cmake).
 #if defined(__clang__) || !defined(__x86_64__)
 #define HYBRID_MULTIVERSIONED

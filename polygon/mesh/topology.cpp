@@ -23,9 +23,9 @@ std::uint64_t hash_of(const glm::dvec3& v) {
   return h;
 }
 
-// Counting sort, linear in the number of triangles. Counts are stored two places further up. After summing,
-// place b + 1 is the start of bucket b. next() advances it, so that finally bucket b runs from place b to
-// place b + 1.
+// Counting sort, linear in the number of triangles. The count of bucket b is stored in places_[b + 2]. After
+// sum(), places_[b + 1] is the start of bucket b. next(b) advances it to the bucket's end. In the end bucket
+// b runs from places_[b] to places_[b + 1].
 class Buckets {
  public:
   explicit Buckets(std::uint32_t buckets) : places_(static_cast<std::size_t>(buckets) + 2, 0) {}
@@ -144,7 +144,7 @@ std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> tri
   const std::vector<std::size_t> starts = std::move(by_low).starts();
 
   std::vector<std::uint32_t> first(triangles.size());
-  // The other two corners in ascending order, then the triangle's index.
+  // A triangle's key in its bucket: its other two corners in ascending order, then its index.
   using Key = std::pair<std::uint64_t, std::uint32_t>;
   const auto key_of = [&](std::uint32_t triangle) {
     const TriangleIndices t = in_order(triangles[triangle]);

@@ -23,7 +23,7 @@ struct WeldedVertices {
 [[nodiscard]] std::vector<TriangleIndices> welded_triangles(const TriangleMesh& mesh,
                                                             const WeldedVertices& welded);
 
-// True if two corners are the same point. Such a triangle has no interior and takes no part in connectivity.
+// True if two corners are the same point. Such a triangle has no interior and is ignored in connectivity.
 [[nodiscard]] inline bool has_repeated_corner(const TriangleIndices& t) {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
@@ -35,7 +35,7 @@ class EdgeTable {
   // Throws std::invalid_argument for 2^31 triangles or more.
   EdgeTable(std::span<const TriangleIndices> triangles, std::uint32_t points);
 
-  // One triangle that has the edge.
+  // One triangle's use of the edge.
   class Use {
    public:
     Use() = default;
@@ -70,7 +70,7 @@ class EdgeTable {
   [[nodiscard]] bool empty() const { return uses_.empty(); }
 
  private:
-  std::vector<std::size_t> starts_;  // [point] start of the sides whose low end it is
+  std::vector<std::size_t> starts_;  // [point] where the sides begin whose low end is this point
   std::vector<Use> uses_;
 };
 
@@ -87,22 +87,22 @@ struct EdgeUse {
 [[nodiscard]] std::vector<EdgeUse> sorted_edges(std::span<const TriangleIndices> triangles,
                                                 std::uint32_t points);
 
-// [triangle] the lowest triangle with the same three points in any order; the triangle itself if it is the
-// first.
+// [triangle] the lowest-numbered triangle with the same three points in any order. This may be the triangle
+// itself.
 [[nodiscard]] std::vector<std::uint32_t> first_duplicates(std::span<const TriangleIndices> triangles,
                                                           std::uint32_t points);
 
 inline constexpr std::uint32_t kNoTriangle = kNoIndex;
 
-// [triangle][i] the triangle across the edge from corner i to (i + 1) % 3. kNoTriangle if there is none or
-// more than one, and for triangles with a repeated corner.
+// [triangle][i] the neighbour across the edge from corner i to corner (i + 1) % 3. kNoTriangle if the edge
+// has no other triangle or several, and for a triangle with a repeated corner.
 [[nodiscard]] std::vector<TriangleIndices> triangles_across(std::span<const TriangleIndices> triangles,
                                                             std::uint32_t points);
 
-// Connectivity that a surface needs of its mesh. Corners are compared by their coordinates.
+// The connectivity of a mesh that a surface needs. Corners are compared by their coordinates.
 struct Connections {
-  std::vector<std::uint32_t> distinct;  // ascending: triangles without an earlier duplicate; empty if that is
-                                        // all of them
+  std::vector<std::uint32_t>
+      distinct;  // triangles without an earlier duplicate, ascending; empty if no triangle is a duplicate
   std::vector<TriangleIndices> across;  // triangles_across()
 };
 [[nodiscard]] Connections connect_triangles(const TriangleMesh& mesh);

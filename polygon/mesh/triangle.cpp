@@ -10,11 +10,11 @@
 namespace polygon {
 namespace {
 
-constexpr double kSmallestSquare = 1e-200;  // of a cross product; below it digits are lost
+constexpr double kSmallestSquare = 1e-200;  // of a cross product's squared length; digits are lost below it
 constexpr double kDegenerateSineSquared = 1e-28;
-// Rounding turns a normal by about (epsilon / sine), and shifts a foot point by that fraction of the
-// triangle's length: 0.5 % at a sine of 4e-14. Below this sine the edges, which are at most half the
-// triangle's width away, are compared too.
+// Rounding turns a normal by about epsilon / sine rad. It shifts a foot point by this fraction of the
+// triangle's length: 0.5 % at a sine of 4e-14. Below the sine given here, the edges are compared too. They
+// are at most half the triangle's width away.
 constexpr double kNeedleSineSquared = 1e-12;
 
 bool sine_is_below(double sine_squared, const glm::dvec3& n, const glm::dvec3& ab, const glm::dvec3& ac) {
@@ -24,7 +24,8 @@ bool normal_is_rounding(const glm::dvec3& n, const glm::dvec3& ab, const glm::dv
   return sine_is_below(kDegenerateSineSquared, n, ab, ac);
 }
 
-// Closest point of the segment; a segment of zero length is its first end.
+// Replaces `best` by the closest point of the segment a to b, if that is closer. A segment of zero length
+// counts as its first end.
 void improve_with_segment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, int edge,
                           TrianglePoint& best) {
   const glm::dvec3 ab = b - a;
@@ -57,8 +58,8 @@ glm::dvec3 unit_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec
   if (normal_is_rounding(n, b - a, c - a)) return glm::dvec3(0.0);
   const double square = glm::dot(n, n);
   if (square > kSmallestSquare) return n * (1.0 / std::sqrt(square));
-  // The edges are normalised first: the squared length of the cross product of two nanometer edges is
-  // denormal.
+  // The edges are normalised first, because the cross product of two nanometer edges has a denormal squared
+  // length.
   return glm::normalize(glm::cross(glm::normalize(b - a), glm::normalize(c - a)));
 }
 
@@ -68,8 +69,8 @@ double corner_angle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& 
 
 // Ericson's form (Real-Time Collision Detection, section 5.1.5) compares products of four lengths, whose
 // rounding error grows with 1/area². The edge functions below are triple products with the normal, whose
-// rounding error grows only with 1/area; slivers need that. The closest point of a convex set lies on an edge
-// that the query point is beyond, so only those edges are tested.
+// rounding error grows only with 1/area. Slivers need this accuracy. The closest point of a convex set lies
+// on an edge that the query point is beyond, so only those edges are tested.
 TrianglePoint closest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                                   const glm::dvec3& c) noexcept {
   const glm::dvec3 ab = b - a;
@@ -99,7 +100,7 @@ TrianglePoint closest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, cons
   if (needle || !(beyond[1] > 0.0)) improve_with_segment(p, b, c, 1, best);
   if (needle || !(beyond[2] > 0.0)) improve_with_segment(p, c, a, 2, best);
   if (above) {
-    // A convex combination of the corners, so that it lies in the triangle however the normal was rounded.
+    // As a convex combination of the corners, the point lies in the triangle however the normal was rounded.
     TrianglePoint face;
     face.point = (beyond[1] * a + beyond[2] * b + beyond[0] * c) / (beyond[0] + beyond[1] + beyond[2]);
     face.squared_distance = glm::dot(p - face.point, p - face.point);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Closest point of a triangle, and the feature of the triangle on which it lies. Degenerate triangles have
-// branches of their own (a segment, a point).
+// Closest point of a triangle, and the feature of the triangle on which it lies. Degenerate triangles
+// (segments and points) are handled separately.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct TrianglePoint {
   TriangleFeature feature = TriangleFeature::face;
 };
 
-// True if the sine of the angle between two edges is below 1e-14, so that a normal would be rounding error.
+// True if the sine of the angle at `a` is below 1e-14. Such a triangle's normal would be rounding error.
 [[nodiscard]] bool is_degenerate(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) noexcept;
 
 // Unit normal by the right-hand rule; zero for a degenerate triangle.
@@ -34,19 +34,19 @@ struct TrianglePoint {
 [[nodiscard]] TrianglePoint closest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                                                 const glm::dvec3& c) noexcept;
 
-// The point of closest_on_triangle() alone.
+// Only the point that closest_on_triangle() returns.
 glm::dvec3 closest_point_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                                      const glm::dvec3& c) noexcept;
 
-// unit, from the centroid towards `view`; zero if they coincide
+// A plane that bounds a triangle on the side of a point `view`: normal · x <= support for every point x of
+// it.
 struct TrianglePlane {
-  glm::dvec3 normal{
-      0.0};              // unit, from the triangle's centroid towards `view`; zero if `view` is the centroid
-  double support = 0.0;  // max over the triangle of normal · x
+  glm::dvec3 normal{0.0};  // unit, from the centroid towards `view`; zero if they coincide
+  double support = 0.0;    // maximum of normal · x over the triangle (unit: meter)
 };
-// The plane of a triangle that may come within `radius` of `centre`. False if the triangle's bounds or that
-// plane show that it does not. A few edge lengths away the plane is as good as one through the closest point,
-// and it is cheaper.
+// Computes the plane of a triangle that may come within `radius` of `centre`. Returns false if the triangle's
+// bounds or this plane show that the triangle is further away. At a distance of a few edge lengths, the plane
+// is as good as one through the closest point, and cheaper.
 [[nodiscard]] inline bool triangle_plane_within(const glm::dvec3& centre, double radius,
                                                 const glm::dvec3& view, const glm::dvec3& a,
                                                 const glm::dvec3& b, const glm::dvec3& c,

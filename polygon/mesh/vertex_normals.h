@@ -11,8 +11,9 @@ namespace polygon {
 
 // [vertex] unit normal: the mean of the adjacent triangles' normals, weighted by their angles at the vertex
 // (Thuermer & Wuethrich, Computing vertex normals from polygonal facets, 1998). The result does not depend on
-// how a face was cut into triangles. Coincident vertices share one normal. It is zero if only degenerate
-// triangles use the vertex, or if normals cancel. Floats resolve a direction to 1e-7 at half the memory.
+// how a face was cut into triangles. Coincident vertices share one normal. The normal is zero if only
+// degenerate triangles use the vertex, or if normals cancel. Floats resolve a direction to 1e-7 rad, at half
+// the memory of doubles.
 [[nodiscard]] std::vector<glm::vec3> angle_weighted_normals(const TriangleMesh& mesh);
 
 }  // namespace polygon

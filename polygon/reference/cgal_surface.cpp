@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "polygon/reference/cgal_surface.h"
 
-// CGAL's own checks would walk every box twice; timings of CGAL are taken without them.
+// CGAL's own checks would visit every box twice. Timings of CGAL are taken without these checks.
 #define CGAL_NDEBUG
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
@@ -28,7 +28,8 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-constexpr double kRelativeSlack = 1e-12;  // for rounding between a box's distance and a triangle's
+constexpr double kRelativeSlack =
+    1e-12;  // of a squared radius; rounding may put a triangle nearer than its box
 
 struct Corners {
   const std::vector<glm::dvec3>* vertices = nullptr;
@@ -39,7 +40,8 @@ struct Corners {
   }
 };
 
-// A model of AABBPrimitiveWithSharedData of four bytes, so that the tree does not store the geometry again.
+// Models AABBPrimitiveWithSharedData in four bytes per triangle, so that the tree does not store the geometry
+// again.
 class IndexedTriangle {
  public:
   using Id = std::uint32_t;
@@ -78,8 +80,8 @@ double squared_distance(const glm::dvec3& p, const CGAL::Bbox_3& box) {
   return squared_distance(p, {box.xmin(), box.ymin(), box.zmin()}, {box.xmax(), box.ymax(), box.zmax()});
 }
 
-// Traversal traits for CGAL's tree: opens boxes within `squared_radius` of `point`. The leaf decides the
-// rest, and may reduce the radius.
+// Traversal traits for CGAL's tree. They descend into boxes whose squared distance from `point` is at most
+// `squared_radius`. The callback `leaf` handles each triangle, and may reduce the radius.
 template <typename Leaf>
 class Visit {
  public:
@@ -153,7 +155,7 @@ class CgalSurface final : public RigidSurface {
   [[nodiscard]] std::size_t memory_bytes() const noexcept override;
 
  private:
-  // In coordinates relative to centre_, as all geometry here.
+  // Coordinates are relative to centre_, like all geometry in this class.
   [[nodiscard]] NearPoint closest_local(std::uint32_t element, const glm::dvec3& local) const {
     const TrianglePoint found =
         closest_on_triangle(local, corners_(element, 0), corners_(element, 1), corners_(element, 2));
@@ -161,7 +163,7 @@ class CgalSurface final : public RigidSurface {
   }
   [[nodiscard]] bool answerable(const glm::dvec3& point, double radius) const {
     const glm::dvec3 local = point - centre_;
-    return radius >= 0.0 && glm::dot(local, local) < kFurthestQuery * kFurthestQuery;  // false for NaN too
+    return radius >= 0.0 && glm::dot(local, local) < kFurthestQuery * kFurthestQuery;  // also false for NaN
   }
 
   bool solid_;
@@ -195,7 +197,7 @@ CgalSurface::CgalSurface(const TriangleMesh& mesh, bool solid) : solid_(solid), 
       if (first[i] == i) elements.push_back(i);
     }
   }
-  // The bounded search starts from its radius, so CGAL's k-d tree of hints would never be used.
+  // A search starts from its own radius, so CGAL's k-d tree of starting points would never be used.
   tree_.do_not_accelerate_distance_queries();
   tree_.insert(elements.cbegin(), elements.cend(), corners_);
   tree_.build();
@@ -214,7 +216,7 @@ GatherResult CgalSurface::gather(const glm::dvec3& point, double radius,
       if (result.count == out.size()) std::make_heap(out.begin(), out.end(), nearer);
       return;
     }
-    // Full: keep the nearest, and shrink the radius to the furthest of them.
+    // `out` is full. It keeps the nearest points, and the radius shrinks to the furthest of these.
     result.complete = false;
     if (out.empty()) {
       squared_radius = -1.0;
@@ -239,8 +241,8 @@ GatherResult CgalSurface::gather(const glm::dvec3& point, double radius,
 bool CgalSurface::nearest(const glm::dvec3& point, double radius, NearPoint& out) const noexcept {
   if (!answerable(point, radius)) return false;
   const glm::dvec3 local = point - centre_;
-  // Of equal distances the lower element number wins. kNoElement is above every number, so an element at
-  // exactly `radius` counts.
+  // If distances are equal, the lower element number wins. kNoElement is above every element number, so an
+  // element at exactly `radius` is found.
   NearPoint best{{}, radius, kNoElement};
   auto leaf = [&](std::uint32_t element, double& squared_radius) {
     const NearPoint found = closest_local(element, local);
@@ -273,7 +275,7 @@ GatherResult CgalSurface::survey(const glm::dvec3& centre, double radius, const 
     }
     out[result.count++] = {plane.normal, plane.support + glm::dot(plane.normal, centre_), element};
   };
-  // No slack is needed: minima, maxima and differences are monotonic under rounding.
+  // The box test needs no slack, because minima, maxima and differences are monotonic under rounding.
   Visit visit(local, radius * radius, leaf);
   tree_.traversal(0, visit);
   return result;
@@ -339,7 +341,7 @@ std::size_t CgalSurface::memory_bytes() const noexcept {
          vertex_normals_.capacity() * sizeof(glm::vec3);
 }
 
-// A point given by its index, as IndexedTriangle is for triangles.
+// A point given by its index. It serves points as IndexedTriangle serves triangles.
 class IndexedPoint {
  public:
   using Id = std::uint32_t;

@@ -29,7 +29,7 @@ using ExactTraits = CGAL::AABB_traits<Kernel, Primitive>;
 using ExactTree = CGAL::AABB_tree<ExactTraits>;
 using ExactNode = CGAL::AABB_node<ExactTraits>;
 
-constexpr double kRoundingSlack = 1e-12;  // for a few roundings in double
+constexpr double kRoundingSlack = 1e-12;  // relative; covers a few roundings in double
 constexpr std::size_t kMostEquallyNear = 64;
 constexpr int kMostRays = 32;
 
@@ -83,8 +83,9 @@ bool enters(const glm::dvec3& from, const glm::dvec3& way, const CGAL::Bbox_3& b
   return first <= last + kRoundingSlack;
 }
 
-// Traversal traits for CGAL's tree: descends into a box if opens(box), and calls found(triangle) at each
-// leaf. The two may share state, so a bound that improves narrows the traversal.
+// Traversal traits for CGAL's tree. The traversal descends into a box if opens(box), and calls
+// found(triangle) at each leaf. Both functions may share state, so that an improving bound narrows the
+// traversal.
 template <typename Opens, typename Found>
 class ExactVisit {
  public:
@@ -108,7 +109,8 @@ class ExactVisit {
 
 enum class Crossing : std::uint8_t { no, yes, touches, through_start };
 
-// How the segment from `start` to `end` crosses the triangle.
+// Whether the segment from `start` to `end` crosses the triangle's interior, only touches it, or starts on
+// it.
 Crossing crossing(const Kernel::Point_3& start, const Kernel::Point_3& end, const Kernel::Triangle_3& t) {
   if (t.is_degenerate()) return Crossing::no;
   const CGAL::Orientation below = CGAL::orientation(t[0], t[1], t[2], start);
@@ -214,7 +216,7 @@ double ExactMesh::segment_distance(const glm::dvec3& from, const glm::dvec3& to,
   const Exact::Point_3 a = to_exact(to_cgal(from)), b = to_exact(to_cgal(to));
   Rational least = std::min(CGAL::squared_distance(a, t), CGAL::squared_distance(b, t));
   for (int i = 0; i < 3 && a != b; ++i) {
-    if (t[i] == t[(i + 1) % 3]) continue;  // zero length: its points belong to the other two sides
+    if (t[i] == t[(i + 1) % 3]) continue;  // zero length: the other two sides contain this point
     const Exact::Segment_3 side(t[i], t[(i + 1) % 3]);
     least = std::min(least, Rational(CGAL::squared_distance(Exact::Segment_3(a, b), side)));
   }
@@ -227,7 +229,7 @@ bool ExactMesh::crosses(const glm::dvec3& from, const glm::dvec3& to, std::uint3
   return CGAL::do_intersect(Kernel::Segment_3(to_cgal(from), to_cgal(to)), t);
 }
 
-// First in double; candidates that tie within rounding are compared exactly.
+// Searches in double. Candidates that tie within rounding are then compared exactly.
 ExactMesh::Closest ExactMesh::closest(const glm::dvec3& point) const {
   const Kernel::Point_3 p = to_cgal(point);
   double least = std::numeric_limits<double>::infinity();
@@ -264,8 +266,9 @@ ExactMesh::Closest ExactMesh::closest(const glm::dvec3& point) const {
 bool ExactMesh::inside(const glm::dvec3& point) const {
   if (squared_box_distance(point, data_->box) > 0.0) return false;
   const Kernel::Point_3 start = to_cgal(point);
-  // A segment that touches an edge or a corner decides nothing, so another direction is tried. The directions
-  // form a spiral on the sphere, parallel to nothing that people model.
+  // A segment that touches an edge or a corner is inconclusive, so another direction is tried. The directions
+  // form a spiral on the sphere. None of them is parallel to an axis or another direction that is usual in
+  // models.
   for (int ray = 0; ray < kMostRays; ++ray) {
     const double height = 1.0 - 2.0 * (ray + 0.5141592) / kMostRays, turn = 2.3999632 * ray + 0.7182818;
     const double across = std::sqrt(1.0 - height * height);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Exact queries of a triangle mesh, by CGAL: inside, distance, crossing. For references and tests only: it
-// allocates, and an exact distance costs microseconds.
+// Exact queries of a triangle mesh by CGAL: inside, distance, crossing. They are for references and tests
+// only, because they allocate and an exact distance takes microseconds.
 #pragma once
 
 #include <array>
@@ -15,7 +15,8 @@
 
 namespace polygon {
 
-// base + offset, unrounded: can place a point nearer to a surface than the spacing of doubles of that size.
+// The point base + offset, without rounding the sum. It can be nearer to a surface than the spacing of
+// doubles at these coordinates.
 struct FinePoint {
   glm::dvec3 base{0.0};                 // (unit: meter)
   std::array<long double, 3> offset{};  // (unit: meter)
@@ -33,16 +34,16 @@ class ExactMesh {
   ~ExactMesh();
 
   [[nodiscard]] double size() const;      // diagonal of the bounds (unit: meter)
-  [[nodiscard]] double furthest() const;  // largest coordinate's magnitude (unit: meter)
+  [[nodiscard]] double furthest() const;  // largest magnitude of a coordinate (unit: meter)
   [[nodiscard]] std::array<glm::dvec3, 3> corners(std::uint32_t triangle) const;
 
-  // Triangles whose bounds come within `radius` of the point or segment: all that come so near themselves,
-  // and some others. Replaces the contents of `out`.
+  // Writes the triangles whose bounds come within `radius` of the point or segment. These include all
+  // triangles that are so near, and some others. Replaces the contents of `out`.
   void near_point(const glm::dvec3& point, double radius, std::vector<std::uint32_t>& out) const;
   void near_segment(const glm::dvec3& from, const glm::dvec3& to, double radius,
                     std::vector<std::uint32_t>& out) const;
 
-  // Exact, rounded once at the end.
+  // Distance to one triangle, computed exactly and rounded once at the end (unit: meter).
   [[nodiscard]] double distance(const FinePoint& point, std::uint32_t triangle) const;
   [[nodiscard]] double segment_distance(const glm::dvec3& from, const glm::dvec3& to,
                                         std::uint32_t triangle) const;
@@ -56,7 +57,8 @@ class ExactMesh {
   };
   [[nodiscard]] Closest closest(const glm::dvec3& point) const;
 
-  // Parity of crossings along a segment that ends beyond the bounds; false on the surface.
+  // Whether the point is inside, by the parity of crossings along a segment that ends beyond the bounds.
+  // False on the surface.
   [[nodiscard]] bool inside(const glm::dvec3& point) const;
 
   [[nodiscard]] std::size_t memory_bytes() const;

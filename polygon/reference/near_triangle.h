@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Closest points of triangles for the optimality reference, in long double. Written independently of the
-// proxy's own (triangle.h), so that an error in either one shows.
+// Closest points of triangles for the optimality reference, in long double. This code is independent of the
+// proxy's closest points (triangle.h), so that an error in either one shows.
 #pragma once
 
 #include <array>
@@ -12,15 +12,16 @@
 
 namespace polygon {
 
-// A triangle in coordinates relative to a nearby origin, where long double resolves the differences that
-// matter.
+// A triangle in coordinates relative to a nearby origin. There long double resolves the small differences
+// that matter.
 struct NearTriangle {
   std::uint32_t id = 0;
   std::array<FineVec, 3> corner;  // relative to the origin; exact or nearly so
-  std::array<FineVec, 3> side;    // unit direction from corner i to i + 1; zero for coincident ones
+  std::array<FineVec, 3>
+      side;  // [i] unit direction from corner i to corner (i + 1) % 3; zero if these coincide
   std::array<FineReal, 3> length{};
   FineVec normal{0.0L};
-  bool has_area = false;     // not degenerate, so `normal` is defined
+  bool has_area = false;     // the triangle is not degenerate and `normal` is defined
   FineReal distance = 0.0L;  // from the origin
 };
 
@@ -33,8 +34,8 @@ struct ClosestPoint {
   FineReal distance = 0.0L;
 };
 
-// The foot on the plane if it is within all sides, otherwise the nearest point of the sides. A degenerate
-// triangle consists of its sides.
+// The nearest point of a triangle: the foot on its plane if this lies within all sides, otherwise the nearest
+// point of the sides. A degenerate triangle consists of its sides only.
 [[nodiscard]] ClosestPoint closest_on(const NearTriangle& t, const FineVec& x);
 
 // The nearest point of the side from corner i to corner (i + 1) % 3.

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a proxy is from the true constrained optimum. Every rigid error of this project is measured against
-// this reference. It shares nothing with the proxy: it has its own search tree (CGAL), its own closest points
-// (long double, then exact), and its own solution of the optimality conditions.
+// Measures how far a proxy is from the true constrained optimum. Every proxy error of this project is
+// measured against this reference. It shares nothing with the proxy: it has its own search tree (CGAL), its
+// own closest points (long double, then exact), and its own solution of the optimality conditions.
 //
-// A ball of radius r with centre q and a target `goal` minimises |q − goal|² subject to distance(q, triangle)
-// >= r for every triangle. Each distance is differentiable outside its triangle. So q* satisfies the
-// first-order conditions (Karush, Kuhn and Tucker) if it is feasible and q* − goal = Σ λᵢ nᵢ, λᵢ >= 0. Here
-// nᵢ are the unit vectors to q* from the closest points of touching triangles. At most three of them are
-// needed (Carathéodory). So the candidates are the points where one, two or three offset features meet: the
-// plane of a face, the cylinder about an edge, the ball about a corner.
+// The centre q of a ball of radius r minimises |q − goal|² subject to distance(q, triangle) >= r for every
+// triangle. Each distance is differentiable outside its triangle. So q* satisfies the first-order conditions
+// (Karush, Kuhn and Tucker) if it is feasible and q* − goal = Σ λᵢ nᵢ, λᵢ >= 0. Here nᵢ are the unit vectors
+// to q* from the closest points of touching triangles. At most three vectors are needed (Carathéodory). So
+// there are three kinds of candidate: nearest points on one offset feature, and points where two or three
+// offset features meet. The offset of a face is a plane, that of an edge a cylinder, and that of a corner a
+// sphere.
 #pragma once
 
 #include <cstddef>
@@ -39,21 +40,23 @@ class OptimalityReference {
 
   // The point nearest to `proxy` that satisfies the first-order conditions. All points are in the body frame.
   //
-  // A radius below 1e-9 of the mesh's size is replaced by that skin: the limit r → 0+, in which the side of a
-  // sheet that a point is on is defined. A point across the surface from the proxy does not count: the
-  // straight path there, or a path that arches over a convex edge, must not cross a triangle. The goal itself
-  // is optimal if the ball can go there straight, at any distance. Of several points at the same distance the
-  // first one found is returned. `search_radius_m` bounds the search, and the amount of work is bounded too.
-  // So for a proxy that is off by many features, the error may belong to a point further away than the
-  // nearest optimum, but it is never too small. A goal or proxy that is not finite gives found == false and
-  // an infinite error. Throws std::invalid_argument for a negative radius or search radius.
+  // A radius below 1e-9 of the mesh's size is replaced by this skin. It stands for the limit r → 0+, in which
+  // each point is on a definite side of a sheet. A point across the surface from the proxy does not count:
+  // the straight path to it, or a path that arches over a convex edge, must not cross a triangle. The goal
+  // itself is optimal, at any distance, if the ball can go straight to it. If several points are at the same
+  // distance, the first one found is returned. `search_radius_m` bounds the search, and the amount of work is
+  // bounded too. So for a proxy that is many features away from the optimum, the error may be too large,
+  // because it belongs to a further point. It is never too small. A goal or proxy that is not finite gives
+  // found == false and an infinite error. Throws std::invalid_argument for a negative radius or search
+  // radius.
   [[nodiscard]] NearestOptimum nearest_optimum(const glm::dvec3& goal, const glm::dvec3& proxy, double radius,
                                                double search_radius_m) const;
 
   // Distance to the nearest triangle, exact and rounded once (unit: meter).
   [[nodiscard]] double distance(const glm::dvec3& point) const;
 
-  // Exact, by parity of crossings; false on the surface. Undefined for an open mesh.
+  // Whether the point is inside, exactly, by the parity of crossings. False on the surface. Undefined for an
+  // open mesh.
   [[nodiscard]] bool inside(const glm::dvec3& point) const;
 
   // The global optimum for a closed convex mesh. A goal inside is pushed out through the nearest face, a goal

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Enumerates candidates: the space around the proxy is divided into cells (an octree, nearest first) until
-// few features are within reach of each. Then every subset of one, two or three features is solved.
+// Enumerates candidates. An octree divides the space around the proxy, nearest cells first, until few
+// features can touch a ball centred in a cell. Then every subset of one, two or three features is solved.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,12 +13,13 @@
 namespace polygon {
 namespace {
 
-// Half angle (rad) below a right angle, so that the cone is convex.
+// Largest half angle of a cone of normals (rad). It is below a right angle, so that the cone is convex.
 constexpr FineReal kNarrow = 1.5L;
 constexpr std::size_t kFewFeatures = 8;    // few enough to try all subsets of three
-constexpr std::size_t kManyFeatures = 24;  // with more, triples are not tried in the smallest cells
-constexpr int kDeepest = 6;                // cell subdivisions
-constexpr std::uint64_t kMostWork = 8000;  // bound on closest points and systems solved in one search
+constexpr std::size_t kManyFeatures = 24;  // with more features, no triples are tried
+constexpr int kDeepest = 6;                // largest number of subdivisions of a cell
+constexpr std::uint64_t kMostWork =
+    8000;  // bound on closest points computed plus systems solved, in one search
 
 bool same(const NearFeature& a, const NearFeature& b, FineReal tolerance) {
   if (a.surface.kind != b.surface.kind) return false;
@@ -37,9 +38,9 @@ bool same(const NearFeature& a, const NearFeature& b, FineReal tolerance) {
 
 }  // namespace
 
-// Adds the features of a triangle that can touch a ball whose centre is within `slack` of `centre`. The
-// projection onto a convex set is nonexpansive, and so is the vector from it to the point. So a feature that
-// is off by more than `slack` at the centre is out of reach.
+// Adds the features of a triangle that can touch a ball whose centre is within `slack` of `centre`. A
+// triangle is convex, so both the projection onto it and the vector from there to the point are nonexpansive
+// functions of the point. So a feature whose condition fails by more than `slack` at the centre cannot touch.
 void OptimalityReference::Search::add_features(const NearTriangle& t, const FineVec& centre,
                                                const ClosestPoint& place, FineReal slack,
                                                std::vector<NearFeature>& features) const {
@@ -70,8 +71,8 @@ void OptimalityReference::Search::add_features(const NearTriangle& t, const Fine
   }
 }
 
-// Keeps the triangles that matter in the cell, and lists their features. False if no ball fits into the cell,
-// or none touches anything.
+// Keeps the triangles that can touch a ball centred in the cell, and lists their features. False if every
+// such ball penetrates a triangle, or none touches anything.
 bool OptimalityReference::Search::collect_features(SearchCell& cell,
                                                    std::vector<NearFeature>& features) const {
   features.clear();
@@ -113,8 +114,8 @@ void OptimalityReference::Search::try_subsets(const SearchCell& cell, std::span<
     const std::span<const OffsetFeature> chosen(subset.data(), count);
     try_from(chosen, cell.centre, cell.reach);
     if (radius_ >= cell.reach || corner == nullptr) return;
-    // A ball much smaller than the cell: Newton's method must start at the scale of the round surfaces, at
-    // the corner that they share.
+    // The ball is smaller than the cell. Newton's method must then start at the scale of the round offset
+    // surfaces, near the corner that they share.
     FineVec faces(0.0L);
     bool round = false;
     for (const OffsetFeature& f : chosen) {
@@ -140,8 +141,8 @@ void OptimalityReference::Search::try_subsets(const SearchCell& cell, std::span<
   }
 }
 
-// True if all normals that a ball in the cell can meet lie in one cone, and the direction from the goal does
-// not.
+// True if all contact normals of balls centred in the cell lie in one convex cone, and the direction from the
+// goal lies outside it. Then no point of the cell is optimal.
 bool OptimalityReference::Search::outside_normal_cone(const SearchCell& cell) const {
   if (radius_ <= 2.0L * cell.reach) return false;
   const FineVec pull = cell.centre - goal_;

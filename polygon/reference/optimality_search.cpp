@@ -11,17 +11,17 @@ namespace polygon {
 namespace {
 
 constexpr FineReal kInfinity = std::numeric_limits<FineReal>::infinity();
-// As fractions of the mesh's size.
-constexpr double kTolerance = 1e-12;    // depth within rounding
-constexpr double kFirstSearch = 1e-8;   // a converged proxy is found there
+// The two lengths are fractions of the mesh's size.
+constexpr double kTolerance = 1e-12;    // depth that counts as rounding
+constexpr double kFirstSearch = 1e-8;   // first search radius; enough for a converged proxy
 constexpr double kSearchGrowth = 32.0;  // factor from one search to the next
-// Of the coordinates' size: a few roundings of a double.
+// A few roundings of a double, relative to the largest coordinate.
 constexpr double kRounding = 2e-15;
-// Least skin in these roundings, for meshes far from the origin.
+// Least skin, in multiples of that rounding, for meshes far from the origin.
 constexpr double kSkinRoundings = 256.0;
 
-constexpr FineReal kNegative = 1e-9L;  // relative to |q − goal|: a multiplier above −this is zero
-// Relative to |q − goal|: a larger multiplier needs its contact.
+constexpr FineReal kNegative = 1e-9L;  // relative to |q − goal|: a smaller negative multiplier counts as zero
+// Relative to |q − goal|: a larger multiplier requires a touching triangle with its normal.
 constexpr FineReal kActive = 1e-6L;
 constexpr FineReal kSameNormal = 1e-5L;  // |difference| of unit normals that belong to one contact
 
@@ -62,8 +62,8 @@ void OptimalityReference::Search::consider(const StationaryPoint& candidate) {
   best_point_ = candidate.point;
 }
 
-// The point violates no triangle, and each normal with a positive multiplier belongs to a touching triangle.
-// Decided exactly where long double is close to the bound.
+// Whether the point violates no triangle, and each normal with a positive multiplier belongs to a touching
+// triangle. Distances close to the bound are decided exactly.
 bool OptimalityReference::Search::contacts_are_real(const StationaryPoint& candidate) {
   const FineVec& q = candidate.point;
   const FineReal bearing = kActive * glm::length(q - goal_);
@@ -107,8 +107,8 @@ bool OptimalityReference::Search::is_crossed(const glm::dvec3& from, const glm::
   return false;
 }
 
-// Whether the centre can get there, straight or on an arch over a convex edge. Nothing can lie between two
-// places that are less than a radius apart.
+// Whether the ball's centre can move from the proxy to q, straight or on an arch over a convex edge. No
+// surface can lie between two ball centres that are less than a radius apart.
 bool OptimalityReference::Search::is_reachable(const FineVec& q) const {
   const FineReal distance = glm::length(q);
   if (distance < radius_) return true;

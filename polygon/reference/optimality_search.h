@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The search for one optimum. optimality_candidates.cpp enumerates points that satisfy the conditions on a
 // subset of nearby features. optimality_search.cpp accepts a candidate if its contacts are real and the proxy
-// can get there, and grows the search region until one is found.
+// can reach it. It grows the search region until a candidate is accepted.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ inline constexpr double kSkin = 1e-9;
 
 struct NearFeature {
   OffsetFeature surface;
-  FineVec end{0.0L};  // of an edge: its other end
+  FineVec end{0.0L};  // only for an edge: its other end
 };
 
 struct SearchCell {
@@ -34,11 +34,12 @@ struct SearchCell {
   int depth = 0;
   std::vector<std::uint32_t> triangles;  // that may touch a ball centred in the cell
 
-  // So that a heap's top is the nearest cell.
+  // Puts the nearest cell at the top of a heap.
   bool operator<(const SearchCell& other) const { return nearest > other.nearest; }
 };
 
-// One query. Coordinates are relative to the proxy, where long double resolves the differences that matter.
+// One query. Coordinates are relative to the proxy. There long double resolves the small differences that
+// matter.
 class OptimalityReference::Search {
  public:
   Search(const ExactMesh& mesh, const glm::dvec3& goal, const glm::dvec3& proxy, double radius);
@@ -73,7 +74,7 @@ class OptimalityReference::Search {
   FineReal best_ = std::numeric_limits<FineReal>::infinity();  // distance of best_point_
   FineVec best_point_{0.0L};
   std::vector<std::uint32_t> ids_;
-  std::vector<NearTriangle> triangles_;  // within radius_ + the present reach, nearest first
+  std::vector<NearTriangle> triangles_;  // within radius_ + the current reach of the proxy, nearest first
   // Index of the triangle that last ruled out a candidate; it is tested first.
   std::size_t last_violated_ = 0;
 };

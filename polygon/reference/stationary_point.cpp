@@ -8,14 +8,15 @@ namespace polygon {
 namespace {
 
 constexpr int kMostIterations = 24;
-// Normals whose angle has a smaller sine count as dependent: their common line would be rounding error. The
-// subset without one of them is tried anyway.
+// Normals count as dependent if the sine of their angle is smaller: the line common to their surfaces would
+// be rounding error. The subset without one of these normals is tried anyway.
 constexpr FineReal kDependent = 1e-9L;
-// Step relative to radius + reach; Newton's next one would be its square.
+// Step length relative to radius + reach at which the iteration ends. Newton's next relative step would be
+// about its square.
 constexpr FineReal kConverged = 1e-14L;
-// Smaller curvature along the common line: nothing is stationary.
+// If the curvature along the common line is smaller, no point counts as stationary.
 constexpr FineReal kFlat = 1e-12L;
-// Of the radius; a nearer goal has no direction from the feature.
+// A goal that is nearer to the feature than this fraction of the radius has no direction from it.
 constexpr FineReal kOnAxis = 1e-15L;
 
 // Distance of a point from a feature's plane, line or point, and its gradient.
@@ -32,7 +33,8 @@ Local local(const OffsetFeature& feature, const FineVec& q) {
   return {distance, distance > 0.0L ? away / distance : FineVec(0.0L)};
 }
 
-// ∇²distance · v. The normal turns by the component of v across axis and normal, divided by the distance.
+// ∇²distance · v: the component of v across the axis and the normal, divided by the distance. It is the
+// change of the normal along v.
 FineVec hessian_times(const OffsetFeature& feature, const Local& here, const FineVec& v) {
   if (feature.kind == FeatureKind::face) return FineVec(0.0L);
   FineVec across = v - glm::dot(v, here.normal) * here.normal;
@@ -51,7 +53,8 @@ bool step_on_two(std::span<const OffsetFeature> features, const std::array<Local
   const FineVec cross = glm::cross(n0, n1);
   const FineReal sine2 = glm::dot(cross, cross);
   if (!(sine2 > kDependent * kDependent)) return false;
-  // Dual vectors by cross products. n0 − (n0·n1)·n1 would cancel the difference of nearly parallel normals.
+  // The dual vectors are computed by cross products. For nearly parallel normals, n0 − (n0·n1)·n1 would lose
+  // digits by cancellation.
   const FineVec dual0 = glm::cross(n1, cross) / sine2, dual1 = glm::cross(cross, n0) / sine2;
   step.multiplier = {glm::dot(pull, dual0), glm::dot(pull, dual1), 0.0L};
   const FineVec tangent = cross / std::sqrt(sine2);
@@ -92,7 +95,9 @@ int stationary_on_one(const OffsetFeature& feature, const FineVec& goal, FineRea
     return 1;
   }
   if (!(at_goal.distance > kOnAxis * radius)) {
-    at_goal = {0.0L, local(feature, from).normal};  // every direction is stationary
+    at_goal = {
+        0.0L,
+        local(feature, from).normal};  // the goal is on the axis or centre, so every direction is stationary
     if (at_goal.normal == FineVec(0.0L)) return 0;
   }
   const FineVec foot = goal - at_goal.distance * at_goal.normal;
@@ -108,8 +113,8 @@ int stationary_on_one(const OffsetFeature& feature, const FineVec& goal, FineRea
 
 bool stationary_on_several(std::span<const OffsetFeature> features, const FineVec& goal, FineReal radius,
                            const FineVec& start, FineReal reach, StationaryPoint& out) {
-  // If the radius is large, the surface hardly curves within the reach, and a step that leaves it will not
-  // return.
+  // If the radius is large, the surface hardly curves within the reach. Then an iterate that leaves the reach
+  // will not return.
   const FineReal stray = 4.0L * (radius < reach ? reach + radius : reach);
   FineVec q = start;
   std::array<Local, 3> here;

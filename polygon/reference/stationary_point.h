@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Stationary points of the distance to a goal on one, two or three offset surfaces. An offset surface is the
-// set of points at one distance from a plane, a line or a point. For the optimality reference only: in long
-// double, without regard to the extent of triangles or to obstacles.
+// set of points at one distance from a plane, a line or a point. The functions serve only the optimality
+// reference. They use long double, and ignore the extent of triangles and obstacles.
 #pragma once
 
 #include <array>
@@ -28,8 +28,8 @@ struct StationaryPoint {
   std::array<FineVec, 3> normal{};       // unit vectors from each feature to the point
 };
 
-// All stationary points on one surface (at most two), in closed form; returns their number. `from` gives the
-// direction if the goal is on the axis or centre itself.
+// Writes all stationary points on one surface (at most two), in closed form, and returns their number. If the
+// goal is on the axis or at the centre, the direction is that from there to `from`.
 [[nodiscard]] int stationary_on_one(const OffsetFeature& feature, const FineVec& goal, FineReal radius,
                                     const FineVec& from, std::array<StationaryPoint, 2>& out);
 

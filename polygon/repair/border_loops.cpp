@@ -16,12 +16,12 @@
 namespace polygon {
 namespace {
 
-// Sides that meet in one point are compared in pairs, so that more of them would cost their square. Such a
-// point ends the loops that come to it.
+// The sides that meet in a point are compared in pairs, so the time grows with the square of their number. A
+// point with more sides than this ends the loops that come to it.
 constexpr std::size_t kMostSidesAtPoint = 256;
-constexpr double kTurnRounding = 1e-9;  // rad; two edges of one direction
+constexpr double kTurnRounding = 1e-9;  // rad; two edges with a smaller angle have one direction
 
-// A border edge, in the direction opposite to its triangle's.
+// A border edge. It runs opposite to the direction in which its triangle runs through it.
 struct BorderSide {
   std::array<std::uint32_t, 2> ends{};  // points
   std::uint32_t triangle = 0;
@@ -50,7 +50,7 @@ class BorderWalk {
     for (const bool closed : {false, true}) {
       for (std::uint32_t first = 0; first < sides_.size(); ++first) {
         if (walked[first]) continue;
-        // What is not closed is walked from one of its ends.
+        // An open loop is walked from one of its ends.
         const auto& next = sides_[first].next;
         if (!closed && next[0] != kNoIndex && next[1] != kNoIndex) continue;
         loops.push_back(walk(first, next[0] == kNoIndex ? 0 : 1, closed, walked));
@@ -63,7 +63,7 @@ class BorderWalk {
   }
 
  private:
-  // Goes on from end to end. A closed loop begins in the side's own direction.
+  // Walks from side to side, from `first` on. A closed loop begins in the direction of the first side.
   BorderLoop walk(std::uint32_t first, std::size_t from_end, bool closed, std::vector<bool>& walked) const {
     BorderLoop loop;
     loop.closed = closed;
@@ -89,7 +89,7 @@ class BorderWalk {
     return loop;
   }
 
-  // Items in buckets, in ascending order: those of bucket b begin at start[b].
+  // Items grouped by point. Those of point p begin at start[p], in ascending order.
   struct ByPoint {
     std::vector<std::size_t> start;
     std::vector<std::uint32_t> items;
@@ -98,7 +98,8 @@ class BorderWalk {
     }
   };
 
-  // `visit_all(use)` calls use(point, item) for each pair, the same each time.
+  // Groups items by point. `visit_all(use)` has to call use(point, item) for each pair, and the same pairs at
+  // every call.
   template <typename VisitAll>
   [[nodiscard]] ByPoint by_point(VisitAll&& visit_all) const {
     ByPoint result;
@@ -141,10 +142,12 @@ class BorderWalk {
     sides_[b].next[sides_[b].ends[0] == point ? 0 : 1] = a;
   }
 
-  // Of two sides that follow one another one comes to the point and one leaves it, unless triangles are
-  // turned over, and they bound different fans of triangles, unless there is only one. Such pairs come first,
-  // and of these the one with the least gap. At a crease the triangle beside a side can lie across the gap's
-  // plane, and tells poorly which way leads away from it, so the smaller angle counts.
+  // Joins the sides at a point in pairs, best pairs first. In a good pair, one side comes to the point and
+  // the other leaves it, unless a triangle is turned over. Its two sides also bound different fans of
+  // triangles, unless there is only one fan. Of equally good pairs, the one with the smallest gap angle comes
+  // first. The gap is measured from each side, away from the triangle of that side, and the smaller angle
+  // counts. At a crease a triangle can lie across the gap's plane, and then the angle from its side is
+  // unreliable.
   void join_across_gaps(std::uint32_t point, std::span<const std::uint32_t> here,
                         std::span<const std::uint32_t> triangles_here) {
     struct Gap {
@@ -172,10 +175,12 @@ class BorderWalk {
     }
   }
 
-  // [side here] the fan that its triangle is in: triangles around the point that share edges there.
+  // [i] the fan of the triangle of side here[i]. A fan is a set of triangles around the point that are
+  // connected through shared edges.
   [[nodiscard]] std::vector<std::uint32_t> fans_of(std::uint32_t point, std::span<const std::uint32_t> here,
                                                    std::span<const std::uint32_t> triangles_here) const {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> spokes;  // the other end, place in triangles_here
+    std::vector<std::pair<std::uint32_t, std::uint32_t>>
+        spokes;  // other end of an edge from the point; index into triangles_here
     for (std::uint32_t i = 0; i < triangles_here.size(); ++i) {
       for (const std::uint32_t corner : triangles_[triangles_here[i]]) {
         if (corner != point) spokes.emplace_back(corner, i);
@@ -194,7 +199,8 @@ class BorderWalk {
     return fan_of_side;
   }
 
-  // The angle from one side to another about their common point, away from the first one's triangle.
+  // The angle from one side to another about their common point (rad), measured away from the triangle of the
+  // first side.
   [[nodiscard]] double turn(std::uint32_t point, std::uint32_t from, std::uint32_t to) const {
     const auto direction = [&](std::uint32_t side) {
       const auto& ends = sides_[side].ends;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rims of a mesh: its holes and its outer edges. Checks count them and repair fills them.
+// Finds the rims of a mesh: the rims of its holes and its outer edges. The check counts them, and the repair
+// fills the small ones.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +13,18 @@
 
 namespace polygon {
 
-// Border edges (of exactly one triangle) one after another, in the direction of a fill that agrees with the
-// triangle at the first. Where several rims meet in a point, each goes on across the gap that it runs around,
-// so that two holes with a common corner are two loops. A loop may pass a point more than once.
+// A sequence of border edges (edges of exactly one triangle). Its direction is that of a fill whose
+// orientation agrees with the triangle at the first edge. Where several rims meet in a point, each continues
+// around its own gap, so that two holes with a common corner are two loops. A loop may pass a point more than
+// once.
 struct BorderLoop {
-  std::vector<std::uint32_t> points;     // the end of the last edge is the first point, if it is closed
-  std::vector<std::uint32_t> triangles;  // [i] at the edge from points[i]
-  bool closed = true;                    // false: it ends where an edge has more than two triangles
-  glm::dvec3 lower{0.0}, upper{0.0};     // its box
+  std::vector<std::uint32_t> points;     // if closed, the last edge ends at the first point
+  std::vector<std::uint32_t> triangles;  // [i] the triangle at the edge from points[i]
+  bool closed = true;                    // false: the loop ends at an edge of more than two triangles
+  glm::dvec3 lower{0.0}, upper{0.0};     // bounds of the loop
 };
 
-// `edges` is of these triangles. The order depends on the mesh alone.
+// `edges` must be the table of these triangles. The order of the loops depends only on the mesh.
 [[nodiscard]] std::vector<BorderLoop> border_loops(std::span<const glm::dvec3> points,
                                                    std::span<const TriangleIndices> triangles,
                                                    const EdgeTable& edges);

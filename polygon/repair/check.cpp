@@ -120,8 +120,8 @@ void check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
   check.turned_edges = against.count;
 }
 
-// Triangles around a point that are connected through shared edges form one fan. A manifold point has one
-// fan.
+// The triangles around a point form fans: triangles that are connected through shared edges are in one fan. A
+// manifold point has one fan.
 void check_points(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
   DisjointSets corners(c.triangles.size() * 3);
   edges.for_each([&](const EdgeTable::Edge& edge) {
@@ -168,8 +168,8 @@ void check_boundary(const Connected& c, const EdgeTable& edges, MeshCheck& check
                   " large: the mesh is open, is touched as a two-sided sheet, and has no inside");
 }
 
-// Pieces that share no point, and the signed volume of each. Volumes are taken about the mesh's centre,
-// because far from the origin they would lose their digits.
+// Finds the pieces, which share no point, and the signed volume of each. Volumes are computed about the
+// mesh's centre, because about a distant origin they would lose digits.
 void check_pieces(const Connected& c, MeshCheck& check) {
   DisjointSets pieces(c.points.size());
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-std::numeric_limits<double>::infinity());
@@ -194,7 +194,7 @@ void check_pieces(const Connected& c, MeshCheck& check) {
   for (std::uint32_t i = 0; i < c.triangles.size(); ++i) {
     const std::uint32_t p = pieces.find(c.triangles[i][0]);
     if (!is_piece[p]) continue;
-    is_piece[p] = false;  // counted
+    is_piece[p] = false;  // each piece is counted once
     all.add(centroid_of(c, i), i);
     if (volume[p] < 0.0) negative.add(centroid_of(c, i), i);
     check.volume_m3 += volume[p];
@@ -268,7 +268,7 @@ MeshCheck check_mesh(const TriangleMesh& mesh, bool deep) {
     check_points(c, edges, check);
     check_boundary(c, edges, check);
     check.closed = !edges.empty() && check.border_edges == 0 && check.nonmanifold_edges == 0;
-    // Check_pieces decides whether it is outward.
+    // check_pieces() decides whether the orientation is outward.
     check.oriented = check.closed && check.turned_edges == 0;
   }
   check_pieces(c, check);

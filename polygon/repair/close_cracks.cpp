@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Closes cracks: merges border vertices within a tolerance where that joins two border edges and does no
-// harm.
+// Closes cracks. Border vertices within a tolerance are merged if the merging joins two border edges,
+// degenerates no triangle and gives no edge a third triangle.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -20,10 +20,10 @@
 namespace polygon {
 namespace {
 
-// A border edge must be this many times longer than the gap to count as an edge of its own.
+// Two border edges are joined only if each is at least this many times longer than the gap between them.
 constexpr double kEdgePerGap = 10.0;
 
-// Edges that exactly one triangle has.
+// The edges that belong to exactly one triangle.
 std::vector<EdgeUse> border_of(const std::vector<EdgeUse>& edges) {
   std::vector<EdgeUse> border;
   for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
@@ -36,7 +36,7 @@ std::vector<EdgeUse> border_of(const std::vector<EdgeUse>& edges) {
 }
 
 // Leader clustering: each point joins the nearest leader within the tolerance, or becomes a leader. Leaders
-// are further apart than the tolerance, so a grid cell holds few of them for any input.
+// are further apart than the tolerance, so a grid cell holds few of them, whatever the input.
 class Leaders {
  public:
   Leaders(const std::vector<glm::dvec3>& points, const glm::dvec3& low, double tolerance)
@@ -65,7 +65,8 @@ class Leaders {
   }
 
  private:
-  // 21 bits per axis: exact if the tolerance is at least 1e-6 of the box; below, collisions only cost time.
+  // Each axis has 21 bits. Keys are unique if the tolerance is at least 1e-6 of the bounds. Otherwise keys
+  // may collide, which only costs time.
   static std::uint64_t key(const glm::dvec3& cell) {
     std::uint64_t k = 0;
     for (int i = 0; i < 3; ++i) {
@@ -92,7 +93,7 @@ std::vector<Match> match_edges(const std::vector<glm::dvec3>& points, const std:
                                const std::vector<std::uint32_t>& leader, double tolerance) {
   struct Side {
     std::uint32_t a, b;    // leaders, a < b
-    std::uint32_t pa, pb;  // points of the clusters a and b
+    std::uint32_t pa, pb;  // the edge's ends: points in the clusters of a and b
   };
   std::vector<Side> sides;
   for (const EdgeUse& e : border) {
@@ -125,7 +126,7 @@ std::vector<TriangleIndices> moved(const std::vector<TriangleIndices>& triangles
   return result;
 }
 
-// Maps each point to the one that replaces it.
+// Maps each point to the point that replaces it.
 DisjointSets merged(const std::vector<Match>& matches, std::uint32_t points) {
   DisjointSets target(points);
   for (const Match& m : matches) {
@@ -135,8 +136,9 @@ DisjointSets merged(const std::vector<Match>& matches, std::uint32_t points) {
   return target;
 }
 
-// Removes matches at points whose merging would lose a triangle or give an edge a third one. One pass is
-// enough: a defect that remains with fewer merges was already there with all of them, at the same points.
+// Removes the matches at points whose merging would remove a triangle or give an edge a third triangle. One
+// pass is enough. The remaining merges are fewer, so any defect that they cause was already present, and
+// removed, with all merges.
 void drop_harmful(std::vector<Match>& matches, const std::vector<TriangleIndices>& triangles,
                   std::uint32_t points) {
   DisjointSets target = merged(matches, points);
@@ -184,7 +186,7 @@ ClosedCracks close_cracks(RepairSoup& soup, double tolerance_m) {
   drop_harmful(matches, soup.mesh.triangles, count);
   DisjointSets target = merged(matches, count);
 
-  // Border edges that are borders no more. Each joined pair is met twice and counted once.
+  // Counts border edges that are no longer borders. Each joined pair occurs twice and is counted once.
   std::vector<TriangleIndices> after = moved(soup.mesh.triangles, target);
   const auto before = [](const EdgeUse& a, const EdgeUse& b) {
     return std::tie(a.triangle, a.edge) < std::tie(b.triangle, b.edge);

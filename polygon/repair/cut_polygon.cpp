@@ -25,11 +25,12 @@ namespace {
 using Plane2 = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Flat = Plane2::Point_2;
 
-// More corners of a crossing polygon than this are cut as a fan: the least area takes n³ steps.
+// A polygon that crosses itself and has more corners than this is cut as a fan, because the triangulation of
+// least area takes n³ steps.
 constexpr std::size_t kMostOfLeastArea = 64;
 
 struct Area {
-  std::optional<int> winding;  // of the polygon around it; empty: not visited
+  std::optional<int> winding;  // winding number of the polygon around the area; empty: not visited yet
 };
 using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, Plane2>;
 using FaceBase =
@@ -40,7 +41,7 @@ using Delaunay =
     CGAL::Constrained_Delaunay_triangulation_2<Plane2, Cells,
                                                CGAL::No_constraint_intersection_requiring_constructions_tag>;
 
-// Twice the area that the polygon encloses, along its normal (Newell).
+// A vector along the polygon's normal, of twice the enclosed area (Newell).
 glm::dvec3 area_vector(const std::vector<glm::dvec3>& ring) {
   glm::dvec3 sum(0.0);
   for (std::size_t i = 1; i + 1 < ring.size(); ++i)
@@ -48,7 +49,8 @@ glm::dvec3 area_vector(const std::vector<glm::dvec3>& ring) {
   return sum;
 }
 
-// Without the coordinate that is largest in the normal: the others are exact. The turn keeps the direction.
+// Projects the polygon along the axis in which its normal is largest. The two remaining coordinates are
+// exact. Their order keeps the polygon counterclockwise.
 std::vector<Flat> along_axis(const std::vector<glm::dvec3>& ring, const glm::dvec3& normal) {
   int axis = 0;
   for (int a = 1; a < 3; ++a) axis = std::abs(normal[a]) > std::abs(normal[axis]) ? a : axis;
@@ -60,7 +62,8 @@ std::vector<Flat> along_axis(const std::vector<glm::dvec3>& ring, const glm::dve
   return flat;
 }
 
-// Rounded, but true to the shape where the corners lie a little off their plane.
+// Projects the polygon along its normal. The coordinates are rounded, but corners a little off the plane
+// distort the shape less.
 std::vector<Flat> along_normal(const std::vector<glm::dvec3>& ring, const glm::dvec3& normal) {
   const glm::dvec3 n = glm::normalize(normal);
   const glm::dvec3 other = std::abs(n.x) < 0.5 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
@@ -71,7 +74,8 @@ std::vector<Flat> along_normal(const std::vector<glm::dvec3>& ring, const glm::d
   return flat;
 }
 
-// All corners are seen from the first one, in order and within half a turn. Then the fan lies inside.
+// Whether all corners follow in angular order within half a turn, seen from the first corner. Then a fan from
+// there lies inside the polygon.
 bool fans_from_first(const std::vector<Flat>& ring) {
   for (std::size_t i = 2; i < ring.size(); ++i) {
     if (CGAL::orientation(ring[0], ring[1], ring[i]) != CGAL::LEFT_TURN ||
@@ -81,7 +85,8 @@ bool fans_from_first(const std::vector<Flat>& ring) {
   return true;
 }
 
-// How often the polygon runs from one vertex of the triangulation to the next, less how often back.
+// Net number of times that the polygon runs from one vertex of the triangulation to a neighbour: runs there
+// minus runs back.
 class Passages {
  public:
   void add(std::uint32_t from, std::uint32_t to) { ++net_[{from, to}], --net_[{to, from}]; }
@@ -94,7 +99,8 @@ class Passages {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> net_;
 };
 
-// The neighbour of `from` on the segment to `to`: `to` itself, or a corner that lies on the segment.
+// The neighbour of `from` on the segment from `from` to `to`. It is `to` itself, or a corner that lies on the
+// segment.
 Delaunay::Vertex_handle next_on_segment(const Delaunay& cells, Delaunay::Vertex_handle from,
                                         Delaunay::Vertex_handle to) {
   Delaunay::Vertex_circulator at = cells.incident_vertices(from);
@@ -110,8 +116,8 @@ Delaunay::Vertex_handle next_on_segment(const Delaunay& cells, Delaunay::Vertex_
   return {};
 }
 
-// Spreads the winding numbers from the outside over all areas. Between the two sides of an edge it changes by
-// how often the polygon passes there.
+// Sets the winding numbers of all areas, starting with 0 outside. Across an edge the winding number changes
+// by the net number of passages of the polygon there.
 void wind(Delaunay& cells, const Passages& passages) {
   std::vector<Delaunay::Face_handle> open{cells.infinite_face()};
   open[0]->info().winding = 0;
@@ -129,7 +135,7 @@ void wind(Delaunay& cells, const Passages& passages) {
   }
 }
 
-// The triangles inside, as places in the ring; none if the ring crosses itself in this view of it.
+// The triangles inside the polygon, as indices into the ring. None if the projected ring crosses itself.
 std::vector<std::array<std::uint32_t, 3>> inner_triangles(const std::vector<glm::dvec3>& ring,
                                                           const std::vector<Flat>& flat) {
   Delaunay cells;
@@ -140,7 +146,7 @@ std::vector<std::array<std::uint32_t, 3>> inner_triangles(const std::vector<glm:
     const Delaunay::Vertex_handle at =
         cells.insert(flat[i], i == 0 ? Delaunay::Face_handle() : vertices.back()->face());
     if (cells.number_of_vertices() > before) at->info() = i;
-    if (ring[at->info()] != ring[i]) return {};  // two corners one behind the other
+    if (ring[at->info()] != ring[i]) return {};  // different corners that project to one point
     vertices.push_back(at);
   }
   if (cells.dimension() < 2) return {};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fills small holes: loops of border edges get the triangles of least area. Fills that would intersect the
-// mesh or one another are dropped.
+// Fills small holes: each loop of border edges gets its triangulation of least area. Fills that would
+// intersect the mesh or one another are dropped.
 #include <algorithm>
 #include <cstddef>
 #include <glm/common.hpp>
@@ -38,7 +38,7 @@ glm::dvec3 middle_of(const BorderLoop& loop) {
   return 0.5 * (loop.lower + loop.upper);
 }
 
-// Diagonal of the bounding box of the piece that contains a point.
+// The mesh's pieces. They give the diagonal of the bounding box of the piece that contains a point.
 class Pieces {
  public:
   Pieces(std::span<const glm::dvec3> points, std::span<const TriangleIndices> triangles)
@@ -67,8 +67,8 @@ class Pieces {
   std::vector<glm::dvec3> lower_, upper_;
 };
 
-// Three points on one line: a vertex on another triangle's edge, and a gap without width. A degenerate
-// triangle closes it, and is dissolved later with the others of its kind.
+// A loop of three points on one line: a vertex lies on another triangle's edge, and the gap has no width. A
+// degenerate triangle closes it. Later it is dissolved with the other degenerate triangles.
 bool is_split_edge(const BorderLoop& loop, std::span<const glm::dvec3> points) {
   return loop.closed && loop.points.size() == 3 &&
          is_degenerate(points[loop.points[0]], points[loop.points[1]], points[loop.points[2]]);
@@ -76,7 +76,7 @@ bool is_split_edge(const BorderLoop& loop, std::span<const glm::dvec3> points) {
 
 enum class Limit : std::uint8_t { none, branching, too_long, too_large };
 
-// The first limit that the loop is beyond.
+// The first limit that the loop exceeds.
 Limit limit_of(const BorderLoop& loop, std::span<const glm::dvec3> points, Pieces& pieces,
                const RepairOptions& options) {
   if (!loop.closed) return Limit::branching;
@@ -85,7 +85,8 @@ Limit limit_of(const BorderLoop& loop, std::span<const glm::dvec3> points, Piece
   return large && !is_split_edge(loop, points) ? Limit::too_large : Limit::none;
 }
 
-// The edges of the triangles within the loop. Empty if one has more than two triangles, or lies on the loop.
+// All edges of the fill's triangles. Empty unless each edge of the loop belongs to one triangle and each
+// other edge to two.
 std::vector<std::uint64_t> inner_edges(const BorderLoop& loop,
                                        const std::vector<TriangleIndices>& triangles) {
   std::vector<std::uint64_t> keys;
@@ -106,10 +107,11 @@ std::vector<std::uint64_t> inner_edges(const BorderLoop& loop,
 struct Fill {
   const BorderLoop* loop;
   std::vector<TriangleIndices> triangles;
-  bool flat = false;  // no area: closes a gap without width
+  bool flat = false;  // one triangle without area, which closes a gap without width
 };
 
-// Of a loop within the limits; no triangle if none fits. Keeps the edges that the mesh then has.
+// The fill of a loop that is within the limits. It has no triangle if no triangulation fits. Adds the fill's
+// edges to `old_edges`.
 Fill fill_of(const BorderLoop& loop, const std::vector<glm::dvec3>& points, EdgeKeys& old_edges) {
   Fill fill{.loop = &loop, .triangles = {}, .flat = is_split_edge(loop, points)};
   const bool lone = std::all_of(loop.triangles.begin(), loop.triangles.end(),
@@ -160,7 +162,7 @@ FilledHoles fill_holes(RepairSoup& soup, const RepairOptions& options) {
   std::vector<BorderLoop> loops = border_loops(mesh.vertices, mesh.triangles, edges);
   if (loops.empty()) return result;
   std::stable_sort(loops.begin(), loops.end(), [](const BorderLoop& a, const BorderLoop& b) {
-    return a.points.size() < b.points.size();  // short ones first
+    return a.points.size() < b.points.size();  // short loops first
   });
   Pieces pieces(mesh.vertices, mesh.triangles);
   EdgeKeys old_edges;

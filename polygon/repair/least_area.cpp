@@ -12,7 +12,7 @@ namespace polygon {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr double kLengthCost = 0.01;  // of an inner edge's squared length, beside the area
+constexpr double kLengthCost = 0.01;  // fraction of an inner edge's squared length that is added to the area
 
 }  // namespace
 
@@ -26,7 +26,8 @@ std::vector<TriangleIndices> least_area_triangles(
     if (is_degenerate(at(i), at(j), at(k))) return kNever;
     return 0.5 * glm::length(glm::cross(at(j) - at(i), at(k) - at(i)));
   };
-  // [first][last] of the part of the loop between a chord's ends, by dynamic programming.
+  // cost[first * n + last] is the least cost of the part of the loop from `first` to `last`, by dynamic
+  // programming.
   std::vector<double> cost(n * n, 0.0);
   std::vector<std::size_t> apex(n * n, 0);
   for (std::size_t span = 2; span < n; ++span) {

@@ -88,7 +88,7 @@ std::string in_words(double value) {
   return text.str();
 }
 
-// Merges equal vertices and keeps the first of equal triangles.
+// Merges equal vertices. Of equal triangles only the first is kept.
 RepairSoup merge_equal(const TriangleMesh& mesh, Changes& changes) {
   const WeldedVertices welded = weld_vertices(mesh.vertices);
   RepairSoup soup;
@@ -131,7 +131,7 @@ RepairSoup merge_equal(const TriangleMesh& mesh, Changes& changes) {
   return soup;
 }
 
-// Returns how many holes were not tried.
+// Closes cracks and fills holes. Returns the number of holes that were not tried.
 std::size_t mend_borders(RepairSoup& soup, const RepairOptions& options, Changes& changes) {
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-std::numeric_limits<double>::infinity());
   for (const TriangleIndices& t : soup.mesh.triangles) {
@@ -153,8 +153,8 @@ std::size_t mend_borders(RepairSoup& soup, const RepairOptions& options, Changes
   return holes.untried;
 }
 
-// Compares corners and their cyclic order by coordinates, because orienting may give a triangle copies of its
-// corners.
+// Whether triangle i runs in the same direction in both soups. Corners are compared by their coordinates,
+// because orienting may replace a triangle's corners by copies.
 bool same_sense(const CgalSoup& before, const CgalSoup& after, std::size_t i) {
   const Polygon& a = before.polygons[i];
   const Polygon& b = after.polygons[i];
@@ -219,7 +219,7 @@ void dissolve_flat(Surface& surface, Changes& changes) {
                   : "triangles have three corners on one line; not all of them could be dissolved");
 }
 
-// Self-intersections of the whole mesh, after welding.
+// Self-intersections of the mesh after welding, without its degenerate triangles.
 SelfIntersections intersections_of(const TriangleMesh& mesh) {
   const WeldedVertices welded = weld_vertices(mesh.vertices);
   std::vector<glm::dvec3> points(welded.points);
@@ -263,7 +263,7 @@ PieceSides sides_of(const Surface& surface) {
   return sides;
 }
 
-// Turns every piece outward. If pieces are nested and nothing intersects, inner ones become cavities.
+// Turns every piece outward. If pieces are nested and nothing intersects, inner pieces become cavities.
 void turn_outward(Surface& surface, bool cuts_itself, Changes& changes) {
   const PieceSides before = sides_of(surface);
   if (before.volume.size() > 1 && !cuts_itself) {
@@ -301,14 +301,15 @@ void say_what_is_left(const TriangleMesh& mesh, const RepairOptions& options, st
               "holes or rims were not filled: " + why);
 }
 
-// The outcome, as a check of the mesh finds it.
+// Reports the outcome as a check of the repaired mesh finds it.
 void say_how_it_ended(const TriangleMesh& mesh, Changes& changes) {
   const MeshCheck check = check_mesh(mesh);
   if (check.oriented) {
     changes.push_back({"R09-closed", Severity::info, 1, "the repaired mesh is closed"});
     return;
   }
-  // Triangles are numbered as in the mesh as given, and a repaired one has others.
+  // Findings give triangle numbers of the mesh as given. The repaired mesh has other numbers, so they are
+  // left out.
   const auto place_of = [&](std::string_view id) {
     std::optional<FindingPlace> place;
     for (const Finding& f : check.findings) {
@@ -339,7 +340,7 @@ void say_how_it_ended(const TriangleMesh& mesh, Changes& changes) {
 RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options) {
   RepairedMesh repaired;
   RepairSoup merged = merge_equal(mesh, repaired.changes);
-  // If CGAL refuses a step, the result of the steps before is kept, and the report says so.
+  // If CGAL refuses a step, the result of the previous steps is kept, and the report says so.
   std::size_t untried = 0;
   const char* done = "merged, but not oriented, stitched nor turned outward";
   try {

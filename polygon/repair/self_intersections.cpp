@@ -24,7 +24,7 @@ class PairTest {
       : points_(points), triangles_(triangles) {}
 
   [[nodiscard]] bool intersect(std::uint32_t first, std::uint32_t second) const {
-    // Moves shared corners to the front of both, in the same order.
+    // Moves shared corners to the front of both triangles, in the same order.
     TriangleIndices a = triangles_[first];
     TriangleIndices b = triangles_[second];
     std::size_t shared = 0;
@@ -99,7 +99,8 @@ SelfIntersections find_self_intersections(std::span<const glm::dvec3> points,
           if (++tests > most_tests(triangles.size())) throw EnoughTests{};
           const auto [first, second] = std::minmax({x.info(), y.info()});
           if (!test.intersect(first, second)) return;
-          // Keeps the lowest pair, so that the result does not depend on the order of CGAL's search.
+          // Keeps the pair of lowest indices, so that the result does not depend on the order of CGAL's
+          // search.
           if (result.pairs == 0) result.lower = result.upper = middle(first);
           if (result.pairs++ == 0 || std::pair(first, second) < std::pair(result.first, result.second)) {
             result.first = first;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cost of the force on a node under either energy, on one thread, for a lattice that fits the cache and one
-// that does not.
+// Time for the force on a node under either soft energy, on one thread. One lattice fits into the cache, the
+// other does not.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -27,7 +27,7 @@ struct Field {
     const auto s = static_cast<std::ptrdiff_t>(n);
     return {{u[0].data(), u[1].data(), u[2].data()}, s, s * s};
   }
-  // Calls `row` with the first node of every row inside.
+  // Calls row(node) with the first inner node of every inner row.
   template <typename Row>
   void each_row(Row row) {
     for (std::size_t k = 1; k + 1 < n; ++k) {
@@ -90,7 +90,7 @@ void bricks_by_brick(benchmark::State& state) {
   field.report(state);
 }
 
-// Baseline: six links of one material.
+// The baseline: forces of six links of one material on the nodes of a row.
 HYBRID_MULTIVERSIONED void six_link_row(const voxel::NodeField& field, std::size_t first, std::size_t count,
                                         const std::array<float*, 3>& force) {
   for (std::size_t c = 0; c < 3; ++c) {

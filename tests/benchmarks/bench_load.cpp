@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Time and memory from a mesh file to the first touch. One row per file, each measured in its own process.
+// Time and memory from a mesh file to the first touch. Prints one row per file. Each file is measured in its
+// own process.
 //
 //   bench_load [--threads N] [--unit METERS] FILE…   touches each from above, at its highest vertex
 //   bench_load --sphere EDGE FILE.ply                writes a sphere of 12·EDGE² triangles
@@ -33,7 +34,7 @@
 namespace {
 
 struct Options {
-  int threads = 0;  // processors to use; 0: all
+  int threads = 0;  // number of processors to use; 0: all
   double unit_m = 1e-3;
 };
 

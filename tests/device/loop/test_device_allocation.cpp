@@ -68,7 +68,7 @@ TEST(DeviceAllocation, ATickOfEveryDeviceAllocatesNothing) {
   }
 }
 
-// A driver that does nothing, for the callback: with errors, without, and at its end.
+// A driver whose functions do nothing, for tests of the callback.
 device::HdFunctions idle_driver() {
   device::HdFunctions call;
   call.begin_frame = [](unsigned) {};

@@ -25,7 +25,7 @@ bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Commands of any magnitude that a double has, NaN and infinities included.
+// A random command of any magnitude of a double, including NaN and infinities.
 glm::dvec3 wild_command(std::mt19937_64& random) {
   std::uniform_real_distribution<double> exponent(-320.0, 308.0), sign(-1.0, 1.0);
   std::uniform_int_distribution<int> kind(0, 39);
@@ -184,7 +184,7 @@ TEST(ForceLimit, AFaultOfTheDeviceLetsGoForAsLongAsItLasts) {
   }
 }
 
-// A force that never ends accelerates the tool.
+// A constant force accelerates the tool without end.
 TEST(ForceLimit, NoMoreEnergyThanTheLimitIsHandedOutInAnyWindow) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> unit(-1.0, 1.0), dt(1e-4, 3e-3);
@@ -193,7 +193,7 @@ TEST(ForceLimit, NoMoreEnergyThanTheLimitIsHandedOutInAnyWindow) {
         .max_slew_N_per_s = kInfinity, .soft_start_s = 0.0, .max_energy_J = most_J, .energy_window_s = 0.05};
     ForceLimitState state;
     glm::dvec3 position(0.0), force(0.0);
-    std::vector<std::pair<double, double>> handed;  // time, energy (J)
+    std::vector<std::pair<double, double>> handed;  // time (s), energy (J)
     double now_s = 0.0, most_window_J = 0.0, most_tick_J = 0.0;
     for (int tick = 0; tick < 5000; ++tick) {
       const double dt_s = dt(random);
@@ -218,7 +218,7 @@ TEST(ForceLimit, NoMoreEnergyThanTheLimitIsHandedOutInAnyWindow) {
 TEST(ForceLimit, EnergyThatTheHandGivesIsNotLimited) {
   ForceLimitState state;
   const ForceLimits limits{.soft_start_s = 0.0, .max_energy_J = 0.01};
-  for (int tick = 0; tick < 1000; ++tick) {  // 8 N against 2 m/s: 16 J/s
+  for (int tick = 0; tick < 1000; ++tick) {  // 8 N against a motion at 2 m/s: 16 J/s
     const device::DeviceState tool{.position_m = {2e-3 * tick, 0, 0}};
     ASSERT_EQ(limit_force(limits, state, {-8.0, 0, 0}, tool, 1e-3).x, -8.0);
   }

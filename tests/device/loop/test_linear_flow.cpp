@@ -23,8 +23,8 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return c;
 }
 
-// exp of [[0 1 0] [−q −p 1] [0 0 0]]·t, an independent computation: the time is halved until the series is
-// short, with 11 more bits.
+// An independent computation of the exponential of [[0 1 0] [−q −p 1] [0 0 0]]·t, by scaling and squaring.
+// Long double has 11 more bits.
 Matrix by_squaring(long double p, long double q, long double t) {
   int halvings = 0;
   while ((p + std::sqrt(q) + 1.0L) * t > 0.01L) {
@@ -47,7 +47,8 @@ Matrix by_squaring(long double p, long double q, long double t) {
 }
 
 TEST(LinearFlow, IsTheMatrixExponential) {
-  // Covers every branch: short, oscillating, near critical (0.081 kg, 600 N/m: 13.94 N·s/m), overdamped.
+  // The cases cover every branch: short times, oscillation, near-critical damping (13.94 N·s/m at 0.081 kg
+  // and 600 N/m), and overdamping.
   for (const double mass : {0.02, 0.081, 5.0}) {
     for (const double stiffness : {0.0, 1e-6, 1.0, 255.0, 600.0, 25e3, 1e6}) {
       const double critical = 2.0 * std::sqrt(mass * stiffness);
@@ -56,7 +57,8 @@ TEST(LinearFlow, IsTheMatrixExponential) {
         for (const double time : {1e-9, 2e-5, 1e-4, 1e-3, 3e-3, 1e-2, 0.03, 0.1}) {
           const LinearFlow flow = linear_flow(mass, damping, stiffness, time);
           const Matrix exact = by_squaring(damping / mass, stiffness / mass, time);
-          // Relative to the size that each coefficient has over the time, because each passes through zero.
+          // The last two coefficients pass through zero, so their errors are compared with the largest size
+          // that they may have.
           const double sum_error = std::abs(static_cast<double>(flow.from_acceleration_s2 - exact[0][2]));
           const double speed_error = std::abs(static_cast<double>(flow.from_velocity_s - exact[0][1]));
           const double keep_error = std::abs(static_cast<double>(flow.velocity_factor - exact[1][1]));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The theory of the sampled wall against closed forms by hand and formulas from papers.
+// The theory of the sampled wall against closed forms, derived by hand, and against published formulas.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,9 +12,10 @@ namespace {
 
 using device::SampledLoop;
 
-// Without delay, wall damping and hand the map of (x, v) is a 2×2 matrix, and trace and determinant decide:
+// Largest stable wall stiffness without delay, wall damping and hand. One period maps (x, v) by a 2×2 matrix,
+// whose trace and determinant decide on stability:
 //   x' = x + α·v − K·β·x,  v' = γ·v − K·α/m·x,  γ = e^(−bT/m), α = (1 − γ)·m/b, β = (T − α)/b.
-// det = 1 is the boundary by oscillation, 1 + trace + det = 0 the boundary by alternation.
+// At det = 1 oscillations become unstable, and at 1 + trace + det = 0 alternating motions do.
 double by_hand(double m, double b, double T) {
   const double gamma = std::exp(-b * T / m), alpha = -std::expm1(-b * T / m) * m / b, beta = (T - alpha) / b;
   const double spiral = alpha * alpha / m - gamma * beta;  // det = γ + K·(α²/m − γβ)
@@ -104,7 +105,7 @@ TEST(LoopStability, RadiusIsTheRateAtWhichAMotionGrows) {
         const double rest = queue[delay] / k_hand, away = x - rest;
         x = rest + e * (away * (c + decay * s) + v * s);
         v = e * (v * (c - decay * s) - away * (k_hand / m) * s);
-        if (n % 100 == 99) {  // rescaled; the law is linear
+        if (n % 100 == 99) {  // rescaling is allowed, because the system is linear
           const double scale = 1.0 / std::hypot(x * 300.0, v);
           log_size -= std::log(scale);
           for (double* value : {&x, &v, &before, &queue[0], &queue[1], &queue[2]}) *value *= scale;
@@ -145,7 +146,7 @@ TEST(LoopPassivity, LargestStiffnessIsTheInverse) {
             0.0);
 }
 
-// The published formula with complex numbers, angle by angle.
+// The published formula, evaluated with complex numbers at each angle.
 TEST(LoopPassivity, AngleByAngleAsPrinted) {
   const double T = 2e-3, K = 1500.0, B = 1.2;
   for (int delay = 0; delay <= 3; ++delay) {
@@ -161,7 +162,7 @@ TEST(LoopPassivity, AngleByAngleAsPrinted) {
 }
 
 TEST(FrictionAndQuantisation, AbbottAndOkamura) {
-  // The Premium's friction and encoder: 2·0.04 N / 0.03 mm.
+  // With the Premium's friction and encoder step, the bound is 2·0.04 N / 0.03 mm.
   EXPECT_NEAR(device::friction_and_quantisation_bound(5.0, 1e-3, 0.04, 0.03e-3), 2666.7, 0.1);
   EXPECT_EQ(device::friction_and_quantisation_bound(0.5, 1e-3, 0.04, 0.03e-3), 1000.0);
   EXPECT_EQ(device::friction_and_quantisation_bound(0.5, 1e-3, 0.0, 0.03e-3), 0.0);

@@ -21,9 +21,10 @@ using device::PassivityOptions;
 using device::PassivityState;
 
 constexpr double kTick_s = 1e-3;
-constexpr double kSpare_J = 1e-7;  // as the header guarantees
+constexpr double kSpare_J = 1e-7;  // tolerance that the header guarantees
 
-// Independent account of the energy given, and of its excess over one tick's worst.
+// An independent account of the energy given to the hand, and of its excess over the largest work of one
+// tick.
 class Ledger {
  public:
   void tick(const glm::dvec3& position_m, const glm::dvec3& force_N) {
@@ -52,12 +53,12 @@ TEST(Passivity, RandomForcesOnRandomMotionsNeverGiveMoreThanOneTicksWorst) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> unit(-1.0, 1.0), size(-7.0, -2.4);
   for (int run = 0; run < 300; ++run) {
-    const double way_m = std::pow(10.0, size(random));  // 0.1 µm to 4 mm a tick
+    const double way_m = std::pow(10.0, size(random));  // 0.1 µm to 4 mm per tick
     const double force_N = std::pow(10.0, 3.0 * unit(random));
     const double dt_s = run % 3 == 0 ? 1e-4 : run % 3 == 1 ? 1e-3 : 1e-2;
-    const bool chasing = run % 2 == 0;  // the worst case moves along with the force
+    const bool chasing = run % 2 == 0;  // the worst case: the tool moves along with the force
     const double step_m = run % 5 == 0 ? 0.03e-3 : 0.0;
-    if (way_m > 2.0 * dt_s) continue;  // no tool is that fast
+    if (way_m > 2.0 * dt_s) continue;  // faster than any tool
     PassivityState state;
     Ledger ledger;
     glm::dvec3 position(0.0), force(0.0);
@@ -106,7 +107,7 @@ struct Press {
   std::uint64_t jumps = 0;
 };
 
-// Presses 8 mm into a wall at 50 mm/s and stays, twice.
+// Presses 8 mm into a wall at 50 mm/s and holds. Does this twice.
 Press press(DeviceModel model, device::Grip grip, double stiffness, int delay_ticks, bool control) {
   device::SimulatedDeviceOptions options;
   options.mechanism = device::mechanism(model);
@@ -176,7 +177,8 @@ TEST(Passivity, AWallThatBuzzesIsHeldAsASofterOne) {
 }
 
 TEST(Passivity, WhereTheLoopIsPassiveItCostsLittle) {
-  // Less than a just noticeable difference: 7 % of the 3 N of pressing.
+  // The controller must take less than a just noticeable difference, which is 7 % of the pressing force of 3
+  // N.
   for (const DeviceModel model : {DeviceModel::premium_1_5, DeviceModel::touch}) {
     for (const device::Grip grip : {device::Grip::loose, device::Grip::medium, device::Grip::firm}) {
       for (const double stiffness : {100.0, 300.0, 1000.0}) {
@@ -191,7 +193,7 @@ TEST(Passivity, WhereTheLoopIsPassiveItCostsLittle) {
 }
 
 TEST(Passivity, AForceThatIsPressedInAndHandedBackPassesUnchangedWhereNothingIsLostToSampling) {
-  // Friction alone opposes every motion, so there is nothing to remove.
+  // Pure friction opposes every motion, so the controller must remove nothing.
   PassivityState state;
   double x = 0.0;
   for (int tick = 0; tick < 3000; ++tick) {
@@ -206,7 +208,7 @@ TEST(Passivity, AForceThatIsPressedInAndHandedBackPassesUnchangedWhereNothingIsL
 }
 
 TEST(Passivity, AForceThatLostItsFirstTickComesBackWithinThreeMillimetres) {
-  // The tool is thrown back by one encoder step at the very start, and then pressed in.
+  // At the start, the tool is pushed back by one encoder step. Then it is pressed in.
   PassivityState state;
   const auto wall = [](double x) { return glm::dvec3(x < 0.0 ? -1000.0 * x : 0.0, 0, 0); };
   const PassivityOptions options{.resolution_m = 0.03e-3};

@@ -90,7 +90,7 @@ TEST(StopOnSignal, ObjectsOverlapAndTheLastOneRestoresWhatWasThere) {
     EXPECT_EQ(taken, 0);
     EXPECT_EQ(device::stop_signal(), SIGTERM);
     EXPECT_THROW(device::stop_if_asked(), device::StopAsked);
-    raise(SIGTERM);  // the second one goes to whoever was there
+    raise(SIGTERM);  // the second signal goes to the previous handler
     EXPECT_EQ(taken, 1);
   }
   EXPECT_EQ(device::stop_signal(), 0);

@@ -20,8 +20,8 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Only lower bounds on times are tested, because a loaded machine may wake a thread arbitrarily late; wait()
-// reports that.
+// Only lower bounds on times are tested, because a loaded machine may wake a thread arbitrarily late. wait()
+// reports the lateness.
 TEST(ServoTimer, PeriodsKeepTheirPaceAndMissedOnesAreCounted) {
   ServoTimer timer(2e-3);
   const Clock::time_point start = Clock::now();
@@ -34,7 +34,7 @@ TEST(ServoTimer, PeriodsKeepTheirPaceAndMissedOnesAreCounted) {
   const double periods = kTicks + static_cast<double>(timer.missed());
   const double elapsed_s = seconds_since(start);
   EXPECT_GE(elapsed_s, periods * 2e-3);
-  // The last wake was late_s after the start of its period; late_s counts skipped periods too.
+  // The thread woke `late_s` after the start of the last waited period. late_s includes skipped periods.
   EXPECT_LE(elapsed_s, periods * 2e-3 + std::fmod(late_s, 2e-3) + 0.5);
 }
 
@@ -48,7 +48,7 @@ TEST(ServoTimer, AStallIsSkippedNotMadeUpInABurst) {
   const std::uint64_t missed = timer.missed() - before;
   EXPECT_EQ(missed, static_cast<std::uint64_t>(late_s / 5e-3));
   EXPECT_GE(missed, 9U);
-  // The following ticks are whole periods apart again, not a burst.
+  // The next ticks are again whole periods apart. Missed ticks do not follow in a burst.
   const Clock::time_point start = Clock::now();
   for (int i = 0; i < 3; ++i) timer.wait();
   EXPECT_GE(seconds_since(start), 2 * 5e-3);
@@ -58,7 +58,7 @@ TEST(ServoTimer, PriorityIsGrantedOrTheRemedyIsSaid) {
   std::string said;
   std::thread([&] {
     said = ServoTimer(1e-3).raise_priority();
-  }).join();  // on a thread of its own, so that the other tests keep their priority
+  }).join();  // in a separate thread, so that the other tests keep their priority
   EXPECT_THAT(said, testing::AnyOf(testing::HasSubstr("SCHED_FIFO"), testing::HasSubstr("rtprio")));
   EXPECT_THAT(said, testing::HasSubstr("emory"));
   RecordProperty("said", said);

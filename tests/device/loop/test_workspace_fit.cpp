@@ -13,13 +13,13 @@ using device::WorkspaceFit;
 const Box kTouch{{-0.08, -0.06, -0.035}, {0.08, 0.06, 0.035}};
 
 TEST(WorkspaceFit, TheFramesDifferByAQuarterTurn) {
-  // Right stays right and up stays up; towards the user is the scene's −y.
+  // Right stays right and up stays up. The direction towards the user becomes the scene's −y.
   EXPECT_EQ(device::device_to_scene_axes({1, 0, 0}), glm::dvec3(1, 0, 0));
   EXPECT_EQ(device::device_to_scene_axes({0, 1, 0}), glm::dvec3(0, 0, 1));
   EXPECT_EQ(device::device_to_scene_axes({0, 0, 1}), glm::dvec3(0, -1, 0));
   const glm::dvec3 a(0.3, -1.2, 2.5), b(-0.7, 0.4, 1.1);
   EXPECT_EQ(device::scene_to_device_axes(device::device_to_scene_axes(a)), a);
-  // A rotation: lengths, angles and handedness are kept.
+  // The map is a rotation: it keeps lengths, angles and handedness.
   EXPECT_DOUBLE_EQ(glm::dot(device::device_to_scene_axes(a), device::device_to_scene_axes(b)),
                    glm::dot(a, b));
   EXPECT_EQ(glm::cross(device::device_to_scene_axes({1, 0, 0}), device::device_to_scene_axes({0, 1, 0})),
@@ -35,16 +35,18 @@ TEST(WorkspaceFit, CentreGoesToCentre) {
 }
 
 TEST(WorkspaceFit, ASceneThatIsTooLargeIsToldAndCanBeFitted) {
-  const Box wanted{{-0.1, -0.07, 0.0}, {0.1, 0.07, 0.06}};  // 200 x 140 x 60 mm, the device 160 x 70 x 120
+  const Box wanted{{-0.1, -0.07, 0.0},
+                   {0.1, 0.07, 0.06}};  // 200 x 140 x 60 mm; the device has 160 x 70 x 120 mm
   EXPECT_FALSE(covers(fit_workspace(kTouch, wanted, 1.0), kTouch, wanted));
   const WorkspaceFit fitted = fit_workspace(kTouch, wanted, {});
-  EXPECT_DOUBLE_EQ(fitted.scale, 2.0);  // 140 mm over 70 mm
+  EXPECT_DOUBLE_EQ(fitted.scale, 2.0);  // 140 mm / 70 mm
   EXPECT_TRUE(covers(fitted, kTouch, wanted));
   // A small scene is not enlarged unless the user asks for it.
   EXPECT_EQ(fit_workspace(kTouch, {{0, 0, 0}, {0.01, 0.01, 0.01}}, {}).scale, 1.0);
 }
 
-// Where motion is enlarged, power is equal on both sides; the force is enlarged nowhere.
+// A fit never enlarges the force. If it enlarges motion, the hand's power is the scene's divided by the scale
+// squared.
 TEST(WorkspaceFit, ForcesAreNeverMadeLarger) {
   const glm::dvec3 force(1, -2, 3), velocity(0.1, 0.3, -0.2);
   for (const double scale : {0.1, 0.5, 1.0, 2.0, 10.0}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a column's name says: its quantity, axis and unit.
+// The quantity, axis and unit that are read from a column's name.
 #include "device/paths/column_names.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ using testing::HasSubstr;
 struct Said {
   std::string name;
   Quantity quantity;
-  double in_si;  // 0: no unit is stated
+  double in_si;  // the unit in SI; 0: no unit is stated
   std::size_t axis = 0;
 };
 
@@ -199,7 +199,7 @@ TEST(ColumnNames, AUnknownUnitIsRefusedWithTheKnownOnes) {
 }
 
 TEST(ColumnNames, OfSeveralPositionsThePlainestIsTakenAndEqualOnesAreRefused) {
-  // As in recordings of robots: Euler angles, velocities and quaternions before the position.
+  // In recordings of robots, Euler angles, velocities and quaternions often precede the position.
   const auto yaw = tests::path_of("t_s,roll,pitch,yaw,x_mm,y_mm,z_mm\n0,1,2,1.5,10,20,30\n");
   EXPECT_EQ(yaw.position_m[0], 1e-3 * glm::dvec3(10, 20, 30));
   const auto velocity = tests::path_of("t_s,xvel_mm,yvel_mm,zvel_mm,x_mm,y_mm,z_mm\n0,0,0,-15,10,20,30\n");

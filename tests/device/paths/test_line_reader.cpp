@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lines of text: ends, byte-order marks, comments, and files that are no plain text.
+// Lines of text: line ends, byte-order marks, comments, and files that are not plain text.
 #include "device/paths/line_reader.h"
 
 #include <gmock/gmock.h>
@@ -41,7 +41,8 @@ TEST(LineReader, EndsOfEveryKindAreCountedAsOne) {
   EXPECT_THAT(lines_of("a\r\r\nb\n\rc\r"), ElementsAre("1:a", "3:b", "5:c"));
   EXPECT_THAT(lines_of(" \n\t\n# x\n% y\n\ta\t\n"), ElementsAre("5:\ta\t"))
       << "blank lines and comments are no rows";
-  for (const std::size_t before : {65'534U, 65'535U, 65'536U, 131'071U}) {  // the ends of pieces read at once
+  for (const std::size_t before :
+       {65'534U, 65'535U, 65'536U, 131'071U}) {  // near the ends of the pieces in which a file is read
     std::string text;
     while (text.size() < before)
       text += std::string(std::min<std::size_t>(99, before - text.size()), '#') + "\n";

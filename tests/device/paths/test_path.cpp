@@ -27,7 +27,7 @@ void expect_near(const glm::dvec3& a, const glm::dvec3& b, double tolerance = 1e
       << a.x << ' ' << a.y << ' ' << a.z << " is not " << b.x << ' ' << b.y << ' ' << b.z;
 }
 
-// A path never exceeds its speed, stays at its end points, and is finite at any time.
+// Expects that a path never exceeds its speed, stays at its end points, and is finite at any time.
 void expect_well_behaved(const Path& path, double speed_m_per_s) {
   const double step_s = path.duration_s() / 5000.0;
   for (int i = -100; i < 5100; ++i) {

@@ -38,7 +38,7 @@ class PathFile : public testing::Test {
     std::ofstream(file, std::ios::binary) << text;
     return {.file = file};
   }
-  // The error text of reading; empty if the file is accepted.
+  // The error text of reading the file; empty if the file is accepted.
   static std::string refusal(const CsvPath& path) {
     try {
       read_trajectory(path);
@@ -69,7 +69,8 @@ TEST_F(PathFile, WithoutAUnitTheCallersHolds) {
   const Trajectory read = read_trajectory(path);
   EXPECT_LE(glm::length(read.position_m[0] - glm::dvec3(1.001, 0.002, 0.003)), 1e-15);
   EXPECT_THAT(read.notes, IsEmpty());
-  // A time without a unit is in seconds; a usual step of seconds is doubtful, and said.
+  // A time without a unit is in seconds. If the usual step is then several seconds, a note says so, because
+  // this is doubtful.
   EXPECT_THAT(read_trajectory(csv("t,x_m,y_m,z_m\n0,0,0,0\n10,0,0,0\n20,0,0,0\n")).notes,
               ElementsAre(testing::AllOf(HasSubstr("taken as seconds"), HasSubstr("10 s"))));
 }
@@ -96,7 +97,7 @@ TEST_F(PathFile, TimesBeginAtZero) {
 
 TEST_F(PathFile, ClocksThatCountFrom1970AreRecognisedByTheirSize) {
   struct Clock {
-    const char *heading, *first, *last, *said;  // 2 s apart
+    const char *heading, *first, *last, *said;  // first and last time are 2 s apart
   };
   for (const Clock& clock : {Clock{"time", "1617187200000000000", "1617187202000000000", "nanoseconds"},
                              Clock{"timestamp", "1617187200000000", "1617187202000000", "microseconds"},
@@ -198,7 +199,7 @@ TEST(PathFileData, RecordedTrajectoriesAreFollowed) {
     std::size_t samples;
     double duration_s;
     glm::dvec3 first_m, range_m;
-    double longest_gap_s;  // 0: no gap expected
+    double longest_gap_s;  // 0: no gap is expected
   };
   const Expected recordings[] = {
       {"desk_taurus_S3_T2_right.csv.gz",

@@ -92,14 +92,14 @@ TEST(RowFields, EverySeparatorIsFoundInAPathAndInAMeasurement) {
     EXPECT_EQ(tests::path_of(text).t_s[1], 0.5) << "with decimal commas";
     EXPECT_EQ(tests::measured_of(text).force_N[1], glm::dvec3(0, 0, 0.1));
   }
-  // Where commas stand in the names, and where a first line states the separator.
+  // Commas may stand in the names, and the first line may state the separator.
   EXPECT_EQ(tests::path_of("t, s;x, mm;y, mm;z, mm\n0;1,5;2;3\n").position_m[0],
             1e-3 * glm::dvec3(1.5, 2, 3));
   EXPECT_EQ(tests::path_of("sep=;\nt_s;x_mm;y_mm;z_mm\n0;1,5;2;3\n").position_m[0],
             1e-3 * glm::dvec3(1.5, 2, 3));
   EXPECT_EQ(tests::path_of("t [s] x [mm] y [mm] z [mm]\n0 1,5 2 3\n").position_m[0],
             1e-3 * glm::dvec3(1.5, 2, 3));
-  // Without names: blanks between, and commas in the numbers.
+  // A file without names, with blanks between the numbers and decimal commas.
   EXPECT_EQ(tests::measured_of("0,5 1,5 2,5 3,5 0,1 0,2 0,3\n").position_m[0],
             1e-3 * glm::dvec3(1.5, 2.5, 3.5));
 }
@@ -145,7 +145,7 @@ TEST(RowFields, ThousandSeparatorsAndDecimalCommasAreToldApart) {
               AllOf(HasSubstr("a file.csv:2: '10,000'"), HasSubstr("thousands")));
   EXPECT_THAT(tests::path_refusal("t_s;x_mm;y_mm;z_mm\n0,5;10;20;30\n0.75;10;20;30\n"),
               HasSubstr("decimal comma"));
-  // A text beside the numbers decides nothing.
+  // A column of text does not decide on the decimal mark.
   EXPECT_EQ(tests::path_of("note;t_s;x_mm;y_mm;z_mm\n0,5;0.5;1.5;2;3\n").position_m[0],
             1e-3 * glm::dvec3(1.5, 2, 3));
 }

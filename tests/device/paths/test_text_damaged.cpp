@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Randomly damaged text files, with a fixed seed: each is read into sound samples, or refused with its name.
+// Randomly damaged text files, with a fixed seed. Each is read into valid samples, or refused with a message
+// that names it.
 #include <gtest/gtest.h>
 
 #include <cmath>

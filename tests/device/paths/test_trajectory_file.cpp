@@ -127,7 +127,7 @@ TEST(TrajectoryFile, UnitsThatAreNotStatedAreSaid) {
 TEST(TrajectoryFile, GapsAndRepeatedTimesAreToldAndGapsAreNoMeasurement) {
   std::string text = "t_s,x_m,y_m,z_m,fx_N,fy_N,fz_N\n";
   for (int i = 0; i < 20; ++i) text += std::to_string(0.001 * i) + ",0,0,0,1,0,0\n";
-  text += "0.019,0,0,0,3,0,0\n";  // repeated time
+  text += "0.019,0,0,0,3,0,0\n";  // a repeated time
   for (int i = 0; i < 20; ++i) text += std::to_string(0.5 + 0.001 * i) + ",0,0,0,1,0,0\n";
   const auto found = read("r.csv", text);
   ASSERT_EQ(found.notes.size(), 2U);

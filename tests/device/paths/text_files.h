@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Small text files, read as paths and as measured trajectories.
+// Reads small texts as path files and as measured trajectories.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ inline device::MeasuredTrajectory measured_of(const std::string& bytes, device::
   return device::read_measured(with);
 }
 
-// The text with which reading refuses; empty if it does not.
+// The message with which `read` refuses; empty if it does not refuse.
 template <typename Read>
 std::string refusal_of(const Read& read) {
   try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A PHANToM on the test double of its driver's library.
+// A PHANToM that runs on the test double of its driver's library.
 #pragma once
 
 #include <dlfcn.h>
@@ -44,12 +44,12 @@ class PhantomRig {
     return device::run_servo(*phantom, {}, push);
   }
 
-  // Magnitude of the i-th force that was sent, and the tick that it belongs to.
+  // Magnitude of the i-th force that was sent (N).
   [[nodiscard]] double given_N(std::size_t i) const {
     const auto& f = hd->forces.at(i).newton;
     return std::hypot(f[0], f[1], f[2]);
   }
-  // In the last frame of a tick.
+  // Magnitude of the force in the last frame of a tick (N); -1 if there is none.
   [[nodiscard]] double at_tick_N(std::uint64_t tick) const {
     double found = -1.0;
     for (std::size_t i = 0; i < hd->forces.size(); ++i) {
@@ -75,7 +75,7 @@ inline std::string all(const std::vector<std::string>& messages) {
   return text;
 }
 
-// The error text of `call`; empty if it throws nothing.
+// The error text that `call` throws; empty if it throws nothing.
 template <typename Call>
 std::string refusal(const Call& call) {
   try {

@@ -81,7 +81,7 @@ TEST(HdErrors, EachHasItsNameAndARemedy) {
     EXPECT_NE(text.fault, device::DeviceFault::none) << code;
   }
   EXPECT_EQ(device::hd_error_text(0).outcome, device::HdOutcome::none);
-  // Only faults that a hand or a setting can remedy recover by themselves.
+  // Sessions recover only from faults that the hand or a setting can remedy.
   for (const unsigned code : {0x200U, 0x201U, 0x202U, 0x203U, 0x204U}) {
     EXPECT_EQ(device::hd_error_text(code).outcome, device::HdOutcome::rest) << code;
   }

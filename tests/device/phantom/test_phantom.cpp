@@ -25,7 +25,7 @@ TEST(Phantom, SaysWhatItIs) {
   EXPECT_EQ(info.driver_version, "double 1.0");
   EXPECT_EQ(info.firmware, 192.0);
   EXPECT_TRUE(info.calibrated);
-  EXPECT_DOUBLE_EQ(info.workspace.high_m.x, 0.08);  // reported in millimeters
+  EXPECT_DOUBLE_EQ(info.workspace.high_m.x, 0.08);  // the driver reports millimeters
   EXPECT_TRUE(info.notes.empty());
   EXPECT_EQ(phantom->limits().max_force_N, 3.3);
   EXPECT_DOUBLE_EQ(phantom->limits().workspace_m.y, 0.12);
@@ -170,7 +170,7 @@ TEST(Phantom, AMillionTicksWithoutAFault) {
     const auto phantom = device::open_phantom(rig.options());
     std::uint64_t n = 0;
     auto wall = [&](const ServoInput& input) {
-      // Motion of the double's hand in closed form: 20 mm at 1 Hz, vertically.
+      // The closed form of the double's hand: a vertical motion of 20 mm at 1 Hz.
       const double expected_m = 0.02 * std::sin(2.0 * std::numbers::pi * 1e-3 * static_cast<double>(n));
       worst_m = std::max(worst_m, std::abs(input.device.position_m.z - expected_m));
       const double z = input.device.position_m.z;

@@ -15,9 +15,10 @@ namespace {
 using testing::HasSubstr;
 using tests::PhantomRig;
 
-constexpr std::uint64_t kAt = 2000;  // long after the ramp, so that the full force acts until then
+constexpr std::uint64_t kAt =
+    2000;  // tick of the fault; long after the ramp, so that the full force acts before it
 
-// ---- before any force was sent
+// ---- faults before any force is sent
 struct OpeningFault {
   std::string name;
   std::function<void(FakeHd&)> happen;
@@ -80,7 +81,7 @@ TEST(PhantomOpens, OneFailureIsTriedAgain) {
     rig.hd->failing_inits = failures;
     EXPECT_EQ(rig.serve(1000).ticks, 1000U) << failures;
   }
-  const PhantomRig rig;  // a named device has only that name
+  const PhantomRig rig;  // a named device is opened only by this name
   rig.hd->failing_inits = 1;
   device::PhantomOptions options = rig.options();
   options.open.name = "left";
@@ -108,12 +109,12 @@ TEST(PhantomOpens, AnEncoderResetIsDoneWhenTheHandHoldsTheArm) {
   EXPECT_EQ(rig.hd->updates, std::vector<unsigned>{1});
 }
 
-// ---- while forces are sent
+// ---- faults while forces are sent
 struct RunningFault {
   std::string name;
   std::function<void(FakeHd&)> happen;
-  bool ends = false;          // the session ends; false: the force returns
-  std::uint64_t zero_by = 0;  // ticks after the fault
+  bool ends = false;          // true: the session ends; false: the force returns
+  std::uint64_t zero_by = 0;  // ticks after the fault by which the force must be zero
   std::string what, remedy;
 };
 std::ostream& operator<<(std::ostream& out, const RunningFault& fault) {
@@ -199,7 +200,7 @@ INSTANTIATE_TEST_SUITE_P(
                      "1 positions were not numbers", "check the cable"}),
     [](const auto& fault) { return fault.param.name; });
 
-// A session that continues sees only valid positions.
+// A session that continues after a fault sees only valid positions.
 TEST(PhantomRuns, APositionThatIsNoNumberIsNotSeen) {
   const PhantomRig rig;
   rig.hd->nan_at = 5;
@@ -233,7 +234,7 @@ TEST(PhantomRuns, AFaultIsToldToTheTickWhileItLasts) {
   EXPECT_EQ(seen.back(), device::DeviceFault::none);
 }
 
-// If the driver's thread has died, its last force is not replaced from there. The session sends zero from its
+// If the driver's thread has died, it no longer replaces its last force. So the session sends zero from its
 // own thread.
 TEST(PhantomRuns, ASilentDriverEndsTheSession) {
   const PhantomRig rig;

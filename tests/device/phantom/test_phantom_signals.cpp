@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that is told to stop, or that crashes, ends with zero force.
+// A session that receives a signal to stop, or that crashes, ends with zero force.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -40,8 +40,8 @@ TEST(PhantomSignals, InterruptAndTerminateEndTheSessionWithZeroForce) {
   }
 }
 
-// The last force that a child process sent to the motors before it died of a crash. `crash` is called after
-// 100 ticks: on another thread of the child if `from_main` is set, otherwise on the servo thread.
+// The last force (N) that a child process sent to the motors before it died of a crash. `crash` is called
+// after 100 ticks: on another thread of the child if `from_main` is set, otherwise on the servo thread.
 double last_force_of_crash(void (*crash)(), bool from_main, int& died_of) {
   void* page =
       mmap(nullptr, sizeof(std::atomic<double>), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -68,10 +68,10 @@ double last_force_of_crash(void (*crash)(), bool from_main, int& died_of) {
     // Another thread of the session, such as the window's.
     const std::jthread other([&] {
       while (!go) usleep(500);
-      if (last->load() < 0.9) _exit(3);  // no force was sent, so the test would show nothing
+      if (last->load() < 0.9) _exit(3);  // no force was sent, so the test would prove nothing
       crash();
     });
-    // A long deadline, because a busy machine is not the subject.
+    // The deadline is long, because a busy machine must not end the session.
     device::run_servo(*phantom, {.deadline_s = 60.0}, push);
     _exit(4);
   }

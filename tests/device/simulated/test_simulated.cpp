@@ -79,7 +79,7 @@ TEST(SimulatedDevice, TheHandGivesWayByForceOverStiffnessAndMotorsSaturate) {
   const HandModel hand{.mass_kg = 0.006, .damping_N_s_per_m = 5.0, .stiffness_N_per_m = 600.0};
   for (const DeviceModel model : {DeviceModel::premium_1_5, DeviceModel::touch}) {
     const device::DeviceLimits limits = device_limits(model);
-    // Friction holds the tool anywhere within friction / stiffness.
+    // Friction holds the tool anywhere within friction / stiffness of its target.
     const double tolerance = limits.friction_N / hand.stiffness_N_per_m + limits.resolution_m;
     for (const double force_N : {1.0, 3.0, 100.0, 1e6}) {
       const auto device = make_simulated_device(model, hand, stay_at({0, 0, 0}));
@@ -125,8 +125,8 @@ TEST(SimulatedDevice, TheVelocityEstimateHoldsAtAnyRateAndAfterStalls) {
 }
 
 TEST(SimulatedDevice, ASoftWallIsHeldAndAFarTooStiffOneBuzzes) {
-  // Closed loop: the hand presses 10 mm into walls below and above the stiffness that a sampled loop can
-  // render.
+  // In the closed loop, the hand presses 10 mm into walls. Their stiffness is below or above the largest that
+  // a sampled loop can render.
   const auto unrest_m = [](double stiffness) {
     const auto device =
         make_simulated_device(DeviceModel::premium_1_5, {}, leg({0, 0, 0.01}, {0, 0, -0.01}, 0.05));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Effects of the simulated device on a loop: stability boundary, delay, watchdog, slew rate, tremor.
+// Effects of the simulated device on the haptic loop: stability boundary, delay, watchdog, slew rate, tremor.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,8 +30,8 @@ SimulatedDeviceOptions linear(double mass_kg = 0.075) {
   return options;
 }
 
-// Growth of an oscillation over `ticks`: the ratio of the swing about its mean at the end to that at the
-// start, after one impulse against a two-sided spring of `stiffness`.
+// Growth of an oscillation over `ticks`, after one impulse against a two-sided spring of `stiffness`. It is
+// the swing about the mean at the end, divided by the swing at the start.
 double growth(const SimulatedDeviceOptions& options, double stiffness, double dt_s, int ticks) {
   const auto device = make_simulated_device(options, stay_at({0, 0, 0}));
   double early = 0.0, late = 0.0;
@@ -46,8 +46,8 @@ double growth(const SimulatedDeviceOptions& options, double stiffness, double dt
   return late / early;
 }
 
-// The stiffness at which the determinant of the sampled loop's 2×2 matrix exceeds 1 (Jury), if the mass
-// oscillates between samples.
+// The stiffness (N/m) above which the determinant of the sampled loop's 2×2 matrix exceeds 1 (Jury's
+// criterion). It is the stability limit if the mass oscillates between samples.
 double unstable_above(const SimulatedDeviceOptions& options, double dt_s) {
   const double mass = options.mechanism.apparent_mass_kg + options.hand.mass_kg;
   const double damping = options.hand.damping_N_s_per_m + options.mechanism.viscous_N_s_per_m;
@@ -104,7 +104,8 @@ TEST(SimulatedLoop, DelayMakesTheWallUnstableEarlier) {
 }
 
 TEST(SimulatedLoop, TheWatchdogLetsGoOfTheMotors) {
-  // Pushed for the first 5 ms of a 50 ms stall and free afterwards, as if so commanded.
+  // During a stall of 50 ms the watchdog lets the force act for the first 5 ms only. This equals a commanded
+  // force of 5 ms followed by zero force.
   SimulatedDeviceOptions options;
   options.watchdog_s = 5e-3;
   const auto watched = make_simulated_device(options, stay_at({0, 0, 0}));
@@ -114,7 +115,7 @@ TEST(SimulatedLoop, TheWatchdogLetsGoOfTheMotors) {
   commanded->write({0, 0, 4}, 5e-3);
   commanded->write({0, 0, 0}, 45e-3);
   EXPECT_EQ(watched->read().position_m, commanded->read().position_m);
-  // A late tick equals a long one, and the next write restarts the watchdog.
+  // A late tick has the same effect as a long tick. The next write restarts the watchdog.
   options.watchdog_s = 5e-3;
   const auto late = make_simulated_device(options, stay_at({0, 0, 0}));
   late->write({0, 0, 4}, 1e-3);
@@ -160,7 +161,7 @@ TEST(SimulatedLoop, TremorShakesTheToolAsItsHandAllows) {
   }
   const double w = 2.0 * M_PI * 10.0, m = 0.081;
   const double gain = std::hypot(600.0, w * 5.0) / std::hypot(600.0 - m * w * w, w * 5.0);
-  // The target moves straight within a tick, which shortens the radius by (ωT)²/12.
+  // The target moves on a straight line within a tick. This shortens the radius by the fraction (ωT)²/12.
   EXPECT_NEAR(least, gain * 1e-4, 1e-3 * gain * 1e-4);
   EXPECT_NEAR(most, gain * 1e-4, 1e-3 * gain * 1e-4);
 }

@@ -28,7 +28,7 @@ void advance_about(const ToolMechanics& mechanics, ToolMotion& motion, const glm
   advance(mechanics, motion, target, target, force, dt_s);
 }
 
-// Response at t of m·a + d·v + k·x = k·step, from rest at 0, for any damping.
+// x(t) of m·a + d·v + k·x = k·step, from rest at x = 0, for any damping.
 double step_response(const ToolMechanics& m, double step, double t) {
   const double w = std::sqrt(m.hand_stiffness_N_per_m / m.mass_kg);
   const double zeta = (m.hand_damping_N_s_per_m + m.viscous_N_s_per_m) / (2.0 * m.mass_kg * w);
@@ -73,8 +73,8 @@ TEST(ToolMechanics, AMovingTargetIsFollowedWithoutALagAtConstantSpeed) {
   EXPECT_NEAR(motion.velocity_m_per_s.x, 0.1, 1e-9);
 }
 
-// A brisk hand that circles and jumps, with motors that push aside. Returns the largest change of the tool's
-// position when the substep is halved.
+// A brisk hand circles and jumps, while motors push sideways. Returns the largest change of the tool's
+// position (m) if the substep is halved.
 double changed_by_halving_m(double mass_kg, double coulomb_N, double substep_s) {
   const ToolMechanics mechanics{.mass_kg = mass_kg,
                                 .viscous_N_s_per_m = 0.005,
@@ -98,21 +98,22 @@ double changed_by_halving_m(double mass_kg, double coulomb_N, double substep_s) 
 }
 
 TEST(ToolMechanics, HalvingTheSubstepChangesNothingThatMatters) {
-  // The encoder steps are 30 µm (0.04 N) and 55 µm (0.26 N).
+  // For comparison, the encoder steps are 30 µm (for the device with 0.04 N of friction) and 55 µm (0.26 N).
   EXPECT_LT(changed_by_halving_m(0.081, 0.04, device::kToolSubstep_s), 0.005e-6);
   EXPECT_LT(changed_by_halving_m(0.051, 0.26, device::kToolSubstep_s), 0.05e-6);
   for (const auto& [mass_kg, coulomb_N] : {std::pair{0.081, 0.04}, std::pair{0.051, 0.26}}) {
     double before_m = changed_by_halving_m(mass_kg, coulomb_N, 1e-3);
     for (const double substep_s : {5e-4, 2.5e-4, 1.25e-4}) {
       const double changed_m = changed_by_halving_m(mass_kg, coulomb_N, substep_s);
-      EXPECT_LT(changed_m, before_m / 3.5) << substep_s << " s, " << coulomb_N << " N";  // of second order
+      EXPECT_LT(changed_m, before_m / 3.5)
+          << substep_s << " s, " << coulomb_N << " N";  // convergence is of second order
       before_m = changed_m;
     }
   }
 }
 
 TEST(ToolMechanics, AlongALineTheSubstepHardlyMatters) {
-  // With stops, sticking and reversals: only the moment of a stop depends on the substep.
+  // The motion has stops, sticking and reversals. Only the moment of a stop depends on the substep.
   const ToolMechanics mechanics{.mass_kg = 0.051,
                                 .viscous_N_s_per_m = 0.005,
                                 .coulomb_N = 0.26,
@@ -134,11 +135,11 @@ TEST(ToolMechanics, AlongALineTheSubstepHardlyMatters) {
 }
 
 TEST(ToolMechanics, ATargetThatMovesAwayTakesTheToolAlongWhenItPullsMoreThanFriction) {
-  // At 10 mm/s: 5 N·s/m and 600 N/m pull with 0.26 N after 35 ms.
+  // The target moves at 10 mm/s. After 35 ms, 5 N·s/m and 600 N/m pull with 0.26 N, the friction.
   ToolMechanics mechanics = kHeld;
   mechanics.coulomb_N = 0.26;
   const glm::dvec3 speed(0.006, 0.0, -0.008);
-  for (const double dt_s : {1e-4, 1e-3, 7e-3, 0.1}) {  // wherever the tick ends
+  for (const double dt_s : {1e-4, 1e-3, 7e-3, 0.1}) {  // the moment may lie anywhere in a tick
     ToolIntegrator integrator(mechanics);
     ToolMotion motion;
     double t = 0.0;
@@ -149,7 +150,8 @@ TEST(ToolMechanics, ATargetThatMovesAwayTakesTheToolAlongWhenItPullsMoreThanFric
     }
     for (; t < 0.1 - 1e-9; t += dt_s)
       integrator.advance(motion, t * speed, (t + dt_s) * speed, {0, 0, 0}, dt_s);
-    // From then on linear, with constant friction: starts at rest, pulled by the growth beyond 0.26 N.
+    // From then on the system is linear with constant friction. It starts at rest, and the pull beyond 0.26 N
+    // drives it.
     const device::LinearFlow flow = device::linear_flow(0.081, 5.0, 600.0, t - gives_way_s);
     const double went_m =
         0.01 * (flow.time_s - flow.from_velocity_s) - flow.from_acceleration_s2 * 5.0 * 0.01 / 0.081;
@@ -158,7 +160,8 @@ TEST(ToolMechanics, ATargetThatMovesAwayTakesTheToolAlongWhenItPullsMoreThanFric
 }
 
 TEST(ToolMechanics, CoulombFrictionStopsASlideWhereItsEnergyIsSpent) {
-  // Without a hand: ½·m·v² = f·distance along a straight line, and then rest to the last bit.
+  // Without a hand, the tool moves on a straight line until ½·m·v² = f·distance. Then it rests to the last
+  // bit.
   const ToolMechanics loose{.mass_kg = 0.075, .coulomb_N = 0.04};
   ToolMotion motion;
   motion.velocity_m_per_s = {0.06, -0.08, 0.0};
@@ -194,8 +197,8 @@ TEST(ToolMechanics, BelowTheFrictionNothingCreepsAndAboveItEverythingMoves) {
 }
 
 TEST(ToolMechanics, NoEnergyComesFromNothing) {
-  // With the target at rest and no motor force, kinetic plus spring energy never rises, for soft and stiff
-  // springs.
+  // With the target at rest and no motor force, the sum of kinetic and spring energy never rises, for soft
+  // and for stiff springs.
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (const double stiffness : {0.0, 1.0, 600.0, 25e3, 1e7}) {
@@ -233,7 +236,7 @@ TEST(ToolMechanics, AnUndampedTurnLosesNothing) {
   for (int tick = 0; tick < 100'000; ++tick) advance_about(spring, motion, {0, 0, 0}, {0, 0, 0}, kTick_s);
   const double energy = 0.5 * spring.mass_kg * glm::dot(motion.velocity_m_per_s, motion.velocity_m_per_s) +
                         0.5 * 600.0 * glm::dot(motion.position_m, motion.position_m);
-  EXPECT_NEAR(energy / (0.5 * 600.0 * 1e-4), 1.0, 1e-10);  // rounding of 10^5 ticks
+  EXPECT_NEAR(energy / (0.5 * 600.0 * 1e-4), 1.0, 1e-10);  // allows for the rounding of 10^5 ticks
 }
 
 TEST(ToolMechanics, NoTimeMovesNothingAndTooMuchDoesNotHang) {

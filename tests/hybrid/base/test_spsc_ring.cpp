@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bounded queue between two threads: in order, refusing and counting when full. Also a test for the
-// thread sanitizer.
+// The bounded queue between two threads. It keeps the order. When it is full, it refuses values and counts
+// them. This is also a test for the thread sanitizer.
 #include "hybrid/base/spsc_ring.h"
 
 #include <gtest/gtest.h>

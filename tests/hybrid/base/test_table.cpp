@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables in plain text: every line of a fitted table is as wide as its columns, by letters.
+// Tables in plain text: every line of a fitted table is as wide as its columns, counted in characters.
 #include "hybrid/base/table.h"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The triple buffer between threads: values arrive whole and in order, and the latest is never lost. Also a
-// test for the thread sanitizer.
+// The triple buffer between threads: values arrive whole and in order, and the latest value is never lost.
+// This is also a test for the thread sanitizer.
 #include "hybrid/base/triple_buffer.h"
 
 #include <gtest/gtest.h>

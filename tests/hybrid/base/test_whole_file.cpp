@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Files are written whole or not at all, wherever their name leads.
+// Files are written completely or not at all, whatever kind of file their name leads to.
 #include "hybrid/base/whole_file.h"
 
 #include <fcntl.h>
@@ -92,7 +92,7 @@ TEST_F(WholeFiles, AFullDiskIsSaidAndLeavesWhatWasThere) {
   getrlimit(RLIMIT_FSIZE, &before);
   const auto ignored = std::signal(SIGXFSZ, SIG_IGN);
   const rlimit small{20'000, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &small);  // stands for the disk
+  setrlimit(RLIMIT_FSIZE, &small);  // simulates a full disk
   std::string said;
   try {
     hybrid::save_text(old, std::string(100'000, 'x'));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `hybrid bench occupancy` says: every answer of the map is that of the tree and of brute force. How
-// fast anything is, is not asked here.
+// Results of `hybrid bench occupancy`: every answer of the map equals those of the tree and of brute force.
+// Times are not tested here.
 #include "hybrid/bench/occupancy.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `hybrid bench rigid` on meshes of files: their size, their paths, and the refusal of a wrong file.
+// `hybrid bench rigid` on meshes from files: their size, their paths, and the refusal of a wrong file.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,11 +18,11 @@
 namespace {
 
 using glm::dvec3;
-using namespace hybrid::bench;  // NOLINT(google-build-using-namespace): the tests are about nothing else
+using namespace hybrid::bench;  // NOLINT(google-build-using-namespace): the tests use this namespace only
 
 class BenchOwnMesh : public tests::SceneFile {
  protected:
-  // Runs the paths on a mesh, whose coordinates are saved as they are.
+  // Runs the paths on a mesh that is saved to a file with unchanged coordinates.
   std::vector<RigidRow> rows_of(const polygon::TriangleMesh& mesh, double unit_m = 1e-3) {
     polygon::save_ply(folder_ / "own.ply", mesh);
     RigidBenchOptions options;
@@ -37,7 +37,7 @@ class BenchOwnMesh : public tests::SceneFile {
 };
 
 TEST_F(BenchOwnMesh, AFileIsTouchedAtItsOwnSizeWithoutAnErrorAHandCouldFeel) {
-  // A box that lies far from its file's origin, 80 x 40 x 20 mm.
+  // A box of 80 x 40 x 20 mm that lies far from the origin of its file.
   polygon::TriangleMesh box = polygon::make_box_mesh({40.0, 20.0, 10.0}, 4);
   for (dvec3& v : box.vertices) v += dvec3(100.0, -50.0, 7.0);
   const std::vector<RigidRow> rows = rows_of(box);
@@ -69,7 +69,7 @@ TEST_F(BenchOwnMesh, AFileIsTouchedAtItsOwnSizeWithoutAnErrorAHandCouldFeel) {
 }
 
 TEST_F(BenchOwnMesh, TheUnitScalesTheMeshAndNotTheTool) {
-  const polygon::TriangleMesh ball = polygon::make_ball_mesh(0.05, 3);  // in a file of meters
+  const polygon::TriangleMesh ball = polygon::make_ball_mesh(0.05, 3);  // the file's unit is the meter
   for (const RigidRow& row : rows_of(ball, 1.0)) {
     EXPECT_TRUE(row.radius_m == 0.0 || std::abs(row.radius_m - 0.002) < 1e-12) << row.radius_m;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `hybrid bench rigid` stands on: its paths against their definition, its meshes against counting and
-// geometry, and a short run whose rows say what they must.
+// The parts of `hybrid bench rigid`: its paths against their definitions, its meshes against counts and
+// geometry, and the rows of a short run.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -23,7 +23,7 @@
 namespace {
 
 using glm::dvec3;
-using namespace hybrid::bench;  // NOLINT(google-build-using-namespace): the tests are about nothing else
+using namespace hybrid::bench;  // NOLINT(google-build-using-namespace): the tests use this namespace only
 
 constexpr double kPi = std::numbers::pi;
 
@@ -31,7 +31,7 @@ bool near(const dvec3& a, const dvec3& b, double tolerance) {
   return glm::length(a - b) <= tolerance;
 }
 
-// How often the goal stands at a place, to rounding.
+// Number of ticks in which the goal is at a place, within rounding.
 std::size_t visits(const GoalPath& path, const dvec3& place) {
   std::size_t count = 0;
   for (const dvec3& g : path.goals) count += near(g, place, 1e-15) ? 1 : 0;
@@ -108,7 +108,7 @@ TEST(BenchPaths, TapsGoInAndOutAtTwoMetersASecond) {
   const GoalPath tap = tap_path(0.0);
   ASSERT_EQ(tap.starts.size(), 5000U);
   ASSERT_EQ(tap.goals.size(), 5000U * 41U);
-  // The same draws by hand.
+  // Draws the same random numbers independently.
   SplitMix64 random(12345);
   const auto direction = [&random] {
     const double u1 = random.unit(), u2 = random.unit();
@@ -122,7 +122,8 @@ TEST(BenchPaths, TapsGoInAndOutAtTwoMetersASecond) {
     ASSERT_TRUE(near(tap.goals[k], 0.07 * d, 1e-15));
     ASSERT_TRUE(near(tap.goals[k + 20], 0.03 * d2, 1e-15));
     ASSERT_TRUE(near(tap.goals[k + 40], 0.07 * d2, 1e-15));
-    ASSERT_NEAR(glm::length(tap.goals[k + 25] - tap.goals[k + 24]), 0.002, 1e-12);  // 2 m/s on the way out
+    ASSERT_NEAR(glm::length(tap.goals[k + 25] - tap.goals[k + 24]), 0.002,
+                1e-12);  // the path leaves at 2 m/s
   }
 }
 
@@ -166,8 +167,9 @@ TEST(BenchPaths, TheCornerPathsAreAsWritten) {
     EXPECT_EQ(visits(path, kind.c[0]), 4U);
     EXPECT_EQ(visits(path, kind.c[1]), 6U);
     EXPECT_EQ(visits(path, kind.c[2]), 6U);
-    EXPECT_GE(visits(path, kind.c[3]), 3U * 502U);  // reached, held for 500 ticks, and met on the way back
-    // 500 ticks into the wiggle of the first lap.
+    EXPECT_GE(visits(path, kind.c[3]),
+              3U * 502U);  // reached, held for 500 ticks, and passed again on the way back
+    // Checks the place 500 ticks after the start of the wiggle of the first lap.
     std::size_t hold = 0;
     while (!near(path.goals[hold], kind.c[3], 1e-15)) ++hold;
     const dvec3 wiggle =
@@ -192,7 +194,7 @@ TEST(BenchPaths, AMovingBodyStartsClearOfTheToolAndPassesOverIt) {
     for (std::size_t lap = 0; lap < path.starts.size(); ++lap) {
       const std::size_t first = path.starts[lap];
       const std::size_t last = lap + 1 < path.starts.size() ? path.starts[lap + 1] : path.goals.size();
-      // Clear of a cube's corner and the ball.
+      // The body starts so far away that even a cube's corner does not touch the tool's ball.
       EXPECT_GT(glm::length(path.body_m[first]), std::sqrt(3.0) * kCubeHalf_m + 0.002);
       double nearest = 1.0;
       for (std::size_t k = first; k < last; ++k) {
@@ -210,7 +212,8 @@ TEST(BenchPaths, AMovingBodyStartsClearOfTheToolAndPassesOverIt) {
 
 // ---- meshes ----
 
-// Every edge belongs to two triangles, once in each direction; returns the vertices that are used.
+// Expects that every edge belongs to two triangles, once in each direction. Returns the number of vertices in
+// use.
 std::size_t expect_closed(const polygon::TriangleMesh& mesh) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> directed;
   std::set<std::uint32_t> used;
@@ -239,7 +242,7 @@ TEST(BenchMeshes, BallsAreClosedAndEveryVertexLiesOnTheSphere) {
       const BenchMesh ball = make_bench_mesh(name, scale);
       EXPECT_EQ(ball.mesh.triangles.size(), triangles) << name;
       EXPECT_EQ(bench_mesh_triangles(name), triangles);
-      EXPECT_EQ(ball.mesh.vertices.size(), triangles / 2 + 2) << name;  // Euler
+      EXPECT_EQ(ball.mesh.vertices.size(), triangles / 2 + 2) << name;  // Euler's formula
       EXPECT_EQ(expect_closed(ball.mesh), ball.mesh.vertices.size());
       const double radius = kSphereRadius_m * scale;
       for (const dvec3& v : ball.mesh.vertices) EXPECT_NEAR(glm::length(v), radius, 1e-15 * radius);
@@ -331,12 +334,12 @@ TEST(BenchRigid, AQuickRunSaysWhatItMustAndNothingPopsThrough) {
     }
   }
   for (const std::string& path : rigid_paths())
-    EXPECT_GE(of_path[path], 6U) << path;  // two tools, three engines
+    EXPECT_GE(of_path[path], 6U) << path;  // two tools times three engines
   EXPECT_FALSE(ratio_table(rows).empty());
 }
 
-// A ball of which no survey is ever complete, as where too many triangles lie near the proxy. Then a tick
-// ends before the proxy has arrived.
+// A ball whose survey() is never complete, as if too many triangles lay near the proxy. Then a tick ends
+// before the proxy has reached its optimum.
 class CrowdedSurface final : public polygon::RigidSurface {
  public:
   explicit CrowdedSurface(std::shared_ptr<const polygon::RigidSurface> ball) : ball_(std::move(ball)) {}

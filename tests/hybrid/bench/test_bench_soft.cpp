@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `hybrid bench soft` says, and that what it judges by sees what is wrong. How fast anything is, is not
-// asked here.
+// Results of `hybrid bench soft`, and tests that its checks detect wrong results. Times are not tested here.
 #include "hybrid/bench/soft.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +21,7 @@ using hybrid::bench::SoftRow;
 using hybrid::bench::WaveEngine;
 using hybrid::bench::WaveState;
 
-// Voxels with |x| + |y| + |z| < ratio, of those at and below the surface.
+// Number of voxels with |x| + |y| + |z| < ratio at and below the surface.
 std::size_t octahedron(double ratio) {
   std::size_t count = 0;
   const int reach = static_cast<int>(std::ceil(ratio));
@@ -58,7 +57,7 @@ TEST(BenchSoft, WavesOfTheProductAreExactAndThoseOfAHomogeneousBlockAreOctahedra
       EXPECT_EQ(*row.violated, 0U);
       EXPECT_TRUE(*row.exact);
     }
-    // The hundred pushes meet the side of their block.
+    // Rows with a note are excluded: their hundred pushes reach the side of the block.
     if (row.material == "homogeneous" && row.note.empty()) {
       EXPECT_EQ(*row.moved, octahedron(*row.depth_spacings / *row.slack));
     }
@@ -66,7 +65,7 @@ TEST(BenchSoft, WavesOfTheProductAreExactAndThoseOfAHomogeneousBlockAreOctahedra
   EXPECT_EQ(materials.size(), hybrid::bench::wave_materials().size());
   const auto growth = hybrid::bench::growth_of(rows);
   ASSERT_TRUE(growth.has_value());
-  EXPECT_GT(growth->moved_exponent, 2.5);  // small octahedra have more surface than the cube says
+  EXPECT_GT(growth->moved_exponent, 2.5);  // below 3, because small octahedra have relatively more surface
   EXPECT_LT(growth->moved_exponent, 3.1);
   EXPECT_GT(growth->moved_r2, growth->exponential_r2);
 }
@@ -92,8 +91,8 @@ TEST(BenchSoft, SessionsAndLoadsSayWhatTheyAre) {
   EXPECT_TRUE(rows[1].force_error_N && rows[1].force_error_jnd && rows[1].truncated_share);
 }
 
-// The thesis's figure 22: a corner that both of its links take along swings for ever, ours is at rest at
-// once.
+// The thesis's figure 22: a corner that both of its links move oscillates for ever. The project's own tissue
+// comes to rest at once.
 TEST(BenchSoft, ClassicOscillatesForEverAndOursSettles) {
   const auto objects = hybrid::bench::measure_settling(60);
   ASSERT_EQ(objects.size(), 2U);
@@ -161,7 +160,7 @@ TEST(BenchSoft, GrowthIsTheSlopeOfTheLogarithms) {
   EXPECT_FALSE(growth->classic_time_exponent.has_value());
 }
 
-// The closed form of one push down, with something wrong in it.
+// A fake engine that gives the closed form of one push down. spoil() adds an error to one voxel.
 class Pretended : public WaveEngine {
  public:
   Pretended(double depth, double slack) : depth_(depth), slack_(slack) {}
@@ -207,13 +206,13 @@ TEST(BenchSoft, TheInspectionSeesWhatIsWrong) {
   const WaveState right = look();
   EXPECT_TRUE(right.exact());
   EXPECT_EQ(right.moved, octahedron(depth / slack));
-  wave.spoil({10, 12, 11}, -0.05);  // lags behind
+  wave.spoil({10, 12, 11}, -0.05);  // the voxel lags behind
   EXPECT_GT(look().violated, 0U);
-  wave.spoil({2, 2, 1}, 0.05);  // moved although nothing made it, within its limits
+  wave.spoil({2, 2, 1}, 0.05);  // the voxel moved without cause, but within its limits
   EXPECT_EQ(look().violated, 0U);
   EXPECT_EQ(look().unsupported, 1U);
   EXPECT_EQ(look().moved, right.moved + 1);
-  wave.spoil({12, 12, 12}, -0.02);  // the source came back
+  wave.spoil({12, 12, 12}, -0.02);  // the source moved back
   EXPECT_TRUE(look().source_off);
   EXPECT_NEAR(look().source_off_m, 0.02e-3, 1e-9);
   EXPECT_FALSE(look().exact());

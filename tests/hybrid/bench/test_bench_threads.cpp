@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `hybrid bench threads` says: that it compares ticks which do the same, to the last bit. How fast
-// anything is, is not asked here.
+// Results of `hybrid bench threads`: the compared ticks do the same work, to the last bit. Times are not
+// tested here.
 #include "hybrid/bench/threads.h"
 
 #include <gtest/gtest.h>
@@ -17,9 +17,9 @@ TEST(BenchThreads, WhatIsHandedOutIsFeltAsWhatWasRelaxed) {
   hybrid::bench::ThreadsBenchOptions options;
   options.scenes = {tests::source_folder / "tests/hybrid/tick/arbitration/kept.toml",
                     tests::source_folder / "tests/hybrid/tick/arbitration/soft_on_soft.toml"};
-  options.seconds = 0.1;  // a path's length is longer
+  options.seconds = 0.1;  // shorter than a path
   std::size_t said = 0;
-  options.progress = [&said](const std::string& text) {  // "kept, memory: 0 of 0.1 s"
+  options.progress = [&said](const std::string& text) {  // texts such as "kept, memory: 0 of 0.1 s"
     const std::size_t of = text.rfind(" of "), from = text.rfind(": ");
     ASSERT_TRUE(of != std::string::npos && from < of) << text;
     EXPECT_LE(std::stod(text.substr(from + 2)), std::stod(text.substr(of + 4))) << text;

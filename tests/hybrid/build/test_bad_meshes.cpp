@@ -28,10 +28,10 @@ constexpr double kSize = 0.1;          // m; every mesh is scaled to this size
 
 struct Expected {
   const char* file;
-  const char* found;  // by loading and checking, with self-intersections
-  const char* did;    // by repair
-  const char* left;   // by a second check
-  bool solid_after;   // closed, and oriented outward
+  const char* found;  // findings of loading and of a check, including self-intersections
+  const char* did;    // changes by repair
+  const char* left;   // findings of a second check
+  bool solid_after;   // true: closed and oriented outward after repair
 };
 
 const std::vector<Expected>& expected() {
@@ -85,8 +85,8 @@ Box box_of(const polygon::TriangleMesh& mesh) {
   return box;
 }
 
-// Presses the ball 2 mm into triangles all over the mesh, from both sides, slides 5 mm along each, and
-// leaves.
+// Presses the ball 2 mm into triangles all over the mesh, from both sides, slides 5 mm along each triangle,
+// and leaves.
 void press_and_slide(const std::filesystem::path& file, double unit_m, bool repair) {
   hybrid::Scene scene;
   scene.file = "in the test";
@@ -112,7 +112,7 @@ void press_and_slide(const std::filesystem::path& file, double unit_m, bool repa
     ++ticks;
     ASSERT_TRUE(tests::finite(felt.force_N) && tests::finite(felt.proxy_m));
     const double force = glm::length(felt.force_N);
-    // The felt force is the coupling's alone, within the device's limit.
+    // The felt force is only that of the coupling, within the device's limit.
     ASSERT_LE(force, 8.5 * (1.0 + 1e-9));
     ASSERT_LE(glm::length(tests::coupling(felt) - kStiffness * (felt.proxy_m - felt.device_m)),
               1e-6 * kStiffness * kSize);
@@ -128,7 +128,8 @@ void press_and_slide(const std::filesystem::path& file, double unit_m, bool repa
     const dvec3 at = (a + b + c) / 3.0;
     dvec3 normal = glm::normalize(glm::cross(b - a, c - a));
     if (glm::dot(normal, at - middle) < 0.0) normal = -normal;
-    if (i % 3 == 2) normal = -normal;  // also from the side that a closed mesh keeps the tool out of
+    if (i % 3 == 2)
+      normal = -normal;  // also from the inner side, which the tool cannot reach in a closed mesh
     const dvec3 along = glm::normalize(b - a);
     touch.go(at + 0.02 * normal, 5e-3, 0, look);
     touch.go(at - 2e-3 * normal, 1e-3, 5, look);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// model = "auto": voxels if a hand would notice the compliance, a proxy otherwise.
+// model = "auto" chooses voxels if a hand would notice the compliance, and a proxy otherwise.
 #include "hybrid/build/choose_model.h"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ TEST_F(ModelChoice, TissueStaysVoxelsAndBoneBecomesAProxy) {
   EXPECT_TRUE(bone.soft.empty());
   ASSERT_EQ(bone.rigid.size(), 1U);
   EXPECT_NE(bone.model_notes.at(0).text.find("as rigid"), std::string::npos);
-  // The session then has no voxel data.
+  // With a proxy, the session has no voxel data.
   Touch touch(bone, {0, 0, 0.03});
   EXPECT_TRUE(touch.state().soft.empty());
   EXPECT_TRUE(touch.state().scratch.map_hits.empty());
@@ -66,8 +66,8 @@ TEST_F(ModelChoice, WhoAsksForAModelGetsIt) {
   EXPECT_NE(refusal(text(6e3, "model = \"rigid\"\n")).find("auto"), std::string::npos);
 }
 
-// Checks the choice: pressed with the force that the choice assumes, voxels and proxy differ by less than a
-// JND if the proxy was chosen, and by more for much softer tissue.
+// Voxels and proxy are pressed with the force that the choice assumes. They must differ by less than a JND
+// exactly if the proxy was chosen.
 TEST_F(ModelChoice, TheChoiceIsWhatAHandWouldTell) {
   for (const double young_Pa : {3e4, 3e5, 1e7}) {
     const bool proxy = load(text(young_Pa, "model = \"auto\"\n")).soft.empty();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the build says of a soft object, in figures: where thick slices and small tools put the felt surface,
-// and which keys have no effect. The figures are compared with where a tool first meets the object.
+// The build's notes on a soft object: where the felt surface lies with thick slices and small tools, and
+// which keys have no effect. The notes' figures are compared with the place where a tool first meets the
+// object.
 #include "hybrid/build/soft_notes.h"
 
 #include <fmt/format.h>
@@ -25,14 +26,14 @@ std::string notes_of(const hybrid::BuiltScene& built) {
 
 class SoftNotes : public tests::SceneFile {
  protected:
-  // A block of 60 x 60 x 36 mm, whose top is drawn at z = 18 mm.
+  // A block of 60 x 60 x 36 mm. Its top is drawn at z = 18 mm.
   hybrid::Scene scene(const std::string& spacing, double radius_mm) const {
     return load(
         fmt::format("format = 1\n{}[tool]\nradius = {}\n[[soft]]\nname = \"block\"\nformula = "
                     "\"block\"\nsize = [60, 60, 36]\nspacing = {}\n{}",
                     unlimited, radius_mm, spacing, some_path));
   }
-  // How far inside of the drawn top the tool meets it (mm), straight above (x, y).
+  // Depth below the drawn top at which the tool, coming straight down at (x, y), meets the block (mm).
   static double met_inside_mm(const hybrid::Scene& scene, double x_mm, double y_mm) {
     Touch touch(scene, glm::dvec3(x_mm, y_mm, 50) * 1e-3);
     for (double z = 40.0; z > 0.0; z -= 0.01) {
@@ -50,7 +51,7 @@ TEST_F(SoftNotes, ThickSlicesMoveTheFeltSurfaceByTheFiguresThatAreSaid) {
     const char* said;
     double inside_mm;
   };
-  // Half a slice and the tool's radius, less max(radius + 0.5 pixels, 1.5 slices).
+  // Expected depth: half a slice + radius − max(radius + 0.5 pixels, 1.5 slices).
   for (const Case& c :
        {Case{"[1, 1, 6]", 12.0, "2.5 mm inside", 2.5}, Case{"[1, 1, 4]", 8.0, "1.5 mm inside", 1.5},
         Case{"[1, 1, 6]", 2.0, "4 mm outside", -4.0}, Case{"[2, 2, 3]", 6.0, "0.5 mm inside", 0.5}}) {
@@ -60,7 +61,7 @@ TEST_F(SoftNotes, ThickSlicesMoveTheFeltSurfaceByTheFiguresThatAreSaid) {
     const std::string notes = notes_of(touch.built);
     EXPECT_NE(notes.find("block: slices of"), std::string::npos) << notes;
     EXPECT_NE(notes.find(c.said), std::string::npos) << notes;
-    // Straight above a voxel.
+    // The tool comes down straight above a voxel.
     const double half = c.spacing[1] == '2' ? 1.0 : 0.5;
     EXPECT_NEAR(met_inside_mm(with, half, half), c.inside_mm, 0.03);
   }
@@ -84,7 +85,8 @@ TEST_F(SoftNotes, EqualSpacingAndALargeToolAreNotNoted) {
 }
 
 TEST_F(SoftNotes, ASmallToolIsFeltAsOneOfASpacing) {
-  // 1.5 spacings less half a spacing: 3 mm; 4.5 - 0.5 * 1 mm where pixels are finer.
+  // The felt radius is 1.5 spacings less half a spacing, which is 3 mm. With pixels of 1 mm it is 4.5 - 0.5 *
+  // 1 mm.
   const hybrid::Scene coarse = scene("3", 1.0);
   Touch touch(coarse, {0, 0, 0.05});
   EXPECT_NE(notes_of(touch.built).find("tool of 1 mm radius is felt as one of 3 mm"), std::string::npos)
@@ -150,7 +152,7 @@ TEST_F(UnusedKeys, OfASceneThatUsesAllOfThemNothingIsSaid) {
 }
 
 TEST_F(UnusedKeys, LabelsWithoutAVoxelAreNamed) {
-  // An inclusion that a later one covers leaves no voxel.
+  // An inclusion that a later inclusion covers has no voxel.
   const std::string covered =
       "[material.gel]\n" + small_block +
       "inclusions = [{ shape = \"ball\", size = 4, label = 2 }, { shape = \"box\", size = 8, label = 3 }]\n"

@@ -22,10 +22,11 @@ const ClosedForm rigid_box{
     .shape = ClosedForm::Shape::box, .pose = {}, .half_size_m = {0.03, 0.02, 0.01}, .caveat = {}};
 
 TEST(ClosedForm, DepthInABall) {
-  const auto depth = depth_in(rigid_ball, ball, {0.0, 0.0, 0.022});  // touched at 25 mm
+  const auto depth = depth_in(rigid_ball, ball, {0.0, 0.0, 0.022});  // contact begins at 25 mm
   EXPECT_NEAR(depth.depth_m, 3e-3, 1e-15);
   EXPECT_EQ(depth.out, dvec3(0, 0, 1));
-  const auto oblique = depth_in(rigid_ball, ball, dvec3(0.012, 0.0, -0.016));  // 20 mm out, 3-4-5
+  const auto oblique =
+      depth_in(rigid_ball, ball, dvec3(0.012, 0.0, -0.016));  // 20 mm from the centre; a 3-4-5 triangle
   EXPECT_NEAR(oblique.depth_m, 5e-3, 1e-15);
   EXPECT_NEAR(glm::length(oblique.out - dvec3(0.6, 0.0, -0.8)), 0.0, 1e-12);
   EXPECT_LT(depth_in(rigid_ball, ball, {0.03, 0, 0}).depth_m, 0.0);
@@ -33,7 +34,8 @@ TEST(ClosedForm, DepthInABall) {
 
 TEST(ClosedForm, DepthInABoxAtFaceEdgeAndCorner) {
   EXPECT_NEAR(depth_in(rigid_box, ball, {0.0, 0.0, 0.012}).depth_m, 3e-3, 1e-15);
-  EXPECT_NEAR(depth_in(rigid_box, ball, {0.0, 0.0, 0.008}).depth_m, 7e-3, 1e-15);  // its centre is inside
+  EXPECT_NEAR(depth_in(rigid_box, ball, {0.0, 0.0, 0.008}).depth_m, 7e-3,
+              1e-15);                                                // the tool's centre is inside
   const auto edge = depth_in(rigid_box, ball, {0.033, 0.0, 0.014});  // 3 and 4 mm out: 5 mm from the edge
   EXPECT_NEAR(edge.depth_m, 0.0, 1e-15);
   EXPECT_NEAR(glm::length(edge.out - dvec3(0.6, 0.0, 0.8)), 0.0, 1e-12);
@@ -49,8 +51,9 @@ TEST(ClosedForm, AFlatPunchIsMeasuredAtItsFace) {
 
 TEST(ClosedForm, FollowsThePose) {
   ClosedForm turned = rigid_box;
-  turned.pose = {{1.0, 2.0, 3.0},
-                 glm::angleAxis(glm::radians(90.0), dvec3(0, 1, 0))};  // its z looks along the scene's x
+  turned.pose = {
+      {1.0, 2.0, 3.0},
+      glm::angleAxis(glm::radians(90.0), dvec3(0, 1, 0))};  // the box's z points along the scene's x
   const auto depth = depth_in(turned, ball, {1.012, 2.0, 3.0});
   EXPECT_NEAR(depth.depth_m, 3e-3, 1e-12);
   EXPECT_NEAR(glm::length(depth.out - dvec3(1, 0, 0)), 0.0, 1e-12);
@@ -66,7 +69,8 @@ TEST(ClosedForm, RigidIsTheCouplingAlone) {
 TEST(ClosedForm, AFlatPunchOnTissueIsTwoSpringsInSeries) {
   ClosedForm block = rigid_box;
   block.young_Pa = 91'000.0;
-  block.poisson = 0.3;  // E* = 91000 / 0.91 = 100,000 Pa; 2 a E* = 1000 N/m: as stiff as the coupling
+  block.poisson =
+      0.3;  // E* = 91000 / 0.91 = 100,000 Pa; the stiffness 2 a E* = 1000 N/m equals the coupling's
   EXPECT_NEAR(force_at(block, punch, 4e-3), 2.0, 1e-9);
   EXPECT_STREQ(law_of(block, punch), "flat punch");
 }
@@ -74,14 +78,15 @@ TEST(ClosedForm, AFlatPunchOnTissueIsTwoSpringsInSeries) {
 TEST(ClosedForm, HertzInSeriesWithTheCoupling) {
   ClosedForm block = rigid_box;
   block.young_Pa = 7'500.0;
-  block.poisson = 0.0;  // E* = 7500: 4/3 E* = 10,000
-  // At an indentation of 4 mm: 10,000 · √0.005 · 0.004^1.5 = 0.178885 N, and the coupling gives way by F / K.
+  block.poisson = 0.0;  // E* = 7500 Pa, so 4/3 E* = 10,000 Pa
+  // At an indentation of 4 mm: 10,000 · √0.005 · 0.004^1.5 = 0.178885 N, and the coupling is extended by F /
+  // K.
   const double force = 10'000.0 * std::sqrt(5e-3) * std::pow(4e-3, 1.5);
   EXPECT_NEAR(force, 0.178885, 1e-6);
   EXPECT_NEAR(force_at(block, ball, 4e-3 + force / 1000.0), force, 1e-9);
   EXPECT_STREQ(law_of(block, ball), "hertz");
 
-  ClosedForm soft_ball = rigid_ball;  // 20 mm against 5 mm: R = 4 mm
+  ClosedForm soft_ball = rigid_ball;  // balls of 20 mm and 5 mm: effective radius R = 4 mm
   soft_ball.young_Pa = 7'500.0;
   soft_ball.poisson = 0.0;
   const double on_ball = 10'000.0 * std::sqrt(4e-3) * std::pow(4e-3, 1.5);
@@ -95,7 +100,7 @@ TEST(ClosedForm, ForceGrowsWithDepthAndNeverPassesTheCoupling) {
     block.young_Pa = young;
     before = 0.0;
     for (int step = 0; step < 42; ++step) {
-      const double d = 1e-6 * std::pow(1.3, step);  // to 0.05 m
+      const double d = 1e-6 * std::pow(1.3, step);  // up to 0.05 m
       for (const Tool& tool : {ball, punch}) {
         const double force = force_at(block, tool, d);
         EXPECT_GT(force, 0.0);

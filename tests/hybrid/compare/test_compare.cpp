@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Comparison of models, and the calibration of tissue: what is felt at equilibrium against Hertz and the flat
+// Comparison of models, and calibration of tissue: the felt force at equilibrium against Hertz and the flat
 // punch.
 #include "hybrid/compare/compare.h"
 
@@ -61,9 +61,10 @@ TEST_F(Compare, TheCubeAsProxyVoxelsAndHertz) {
   ASSERT_NE(named(c, "mesh and proxy"), nullptr);
   ASSERT_NE(named(c, "voxels"), nullptr);
   ASSERT_NE(named(c, "hertz"), nullptr);
-  EXPECT_EQ(c.models[c.reference].name, "voxels");  // Hertz leaves the core out
+  EXPECT_EQ(c.models[c.reference].name, "voxels");  // not Hertz, which ignores the core
   EXPECT_GT(max_force(*named(c, "mesh and proxy")), max_force(*named(c, "voxels")));
-  ASSERT_NE(named(c, "classic"), nullptr);  // the thesis's own: it feels the block, and is off
+  ASSERT_NE(named(c, "classic"),
+            nullptr);  // the thesis's model: it feels the block, but its error is larger than that of Hertz
   EXPECT_GT(max_force(*named(c, "classic")), 0.05);
   EXPECT_GT(named(c, "classic")->rms_N, named(c, "hertz")->rms_N);
 }
@@ -80,8 +81,8 @@ TEST_F(Compare, ABallsProxyIsItsClosedFormWithinOnePercent) {
   EXPECT_EQ(c.models[c.reference].name, "rigid closed form");
   const double most = max_force(c.models[c.reference]);
   EXPECT_GT(most, 2.0);
-  // Felt as a mesh: its facets turn the force by up to half the angle between two of them, and hardly change
-  // its size.
+  // The ball is felt as a mesh. Its facets turn the force by up to half the angle between two facets, but
+  // hardly change its magnitude.
   double size_error = 0.0;
   for (std::size_t n = 0; n < proxy->rows.size(); ++n) {
     const double size = glm::length(proxy->rows[n].force_N),
@@ -89,13 +90,13 @@ TEST_F(Compare, ABallsProxyIsItsClosedFormWithinOnePercent) {
     size_error = std::max(size_error, std::fabs(size - exact));
   }
   EXPECT_LE(size_error, 0.01 * most);
-  EXPECT_LE(proxy->direction_p99_deg, 2.5);  // what a finger's joint can tell
+  EXPECT_LE(proxy->direction_p99_deg, 2.5);  // the angle that a finger joint can resolve
   std::printf("ball: of %.2f N, its mesh is off by %.2f %% in size and %.2f degrees in direction (p99)\n",
               most, 100.0 * size_error / most, proxy->direction_p99_deg);
 }
 
 TEST_F(Compare, AnObjectOnAPathIsFeltOnItInEveryModel) {
-  // The ball comes from the left under a tool that goes down, and turns about an axis beside it.
+  // The ball moves from the left under a tool that goes down. It also turns about an axis beside it.
   const auto scene = load(
       "format = 1\n[tool]\nradius = 5\n[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 20\n"
       "position = [-40, 0, 0]\nmotion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 40\n"
@@ -145,13 +146,13 @@ TEST_F(Compare, RefusesAnObjectThatIsNotThere) {
   }
 }
 
-// A block so wide and deep that the contact does not see its ends; spacing 1 mm.
+// A block with a spacing of 1 mm. It is so wide and deep that its ends do not affect the contact.
 class Calibration : public tests::SceneFile {
  protected:
   struct Felt {
     double force_N, indentation_m;
   };
-  // At the end of a hold at `depth_mm`, through a whole session.
+  // Force and indentation at the end of a hold at `depth_mm`, from a whole session.
   Felt pressed(const std::string& tool, double depth_mm, double radius_mm, double stiffness) const {
     const double touched = 35.0 + (tool == "ball" ? radius_mm : 0.0);
     std::ostringstream text;
@@ -187,7 +188,7 @@ TEST_F(Calibration, AFlatPunchFeelsTwoRadiiTimesTheModulus) {
 TEST_F(Calibration, ABallFeelsHertz) {
   const double radius = 16e-3, depth = 1.25e-3, coupling = 500.0;
   const Felt felt = pressed("ball", 1e3 * depth, 1e3 * radius, coupling);
-  ASSERT_GE(std::sqrt(radius * felt.indentation_m), 4e-3);  // the contact radius, at least four spacings
+  ASSERT_GE(std::sqrt(radius * felt.indentation_m), 4e-3);  // the contact radius is at least four spacings
   const auto hertz = [radius](double d) {
     return 4.0 / 3.0 * kModulus * std::sqrt(radius) * std::pow(d, 1.5);
   };

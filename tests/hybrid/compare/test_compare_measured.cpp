@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene against measured forces: synthetic measurements in closed form, of which the error is known.
+// A scene against measured forces. The measurements are synthetic and in closed form, so the error is known.
 #include "hybrid/compare/compare_measured.h"
 
 #include <fmt/format.h>
@@ -16,7 +16,7 @@
 
 namespace {
 
-constexpr double kStiffness_N_per_m = 500.0;  // 0.5 N/mm, as the evaluation's own rendered trajectories
+constexpr double kStiffness_N_per_m = 500.0;  // 0.5 N/mm, as in the rendered trajectories of the evaluation
 constexpr double kRadius_m = 0.02, kTool_m = 0.002;
 
 class CompareMeasured : public tests::SceneFile {
@@ -29,14 +29,14 @@ class CompareMeasured : public tests::SceneFile {
               "[path]\nkind = \"press\"\nfrom = [0, 0, 40]\nto = [0, 0, 20]\n"));
   }
 
-  // A probe that goes up and down over the ball's top, 4 mm deep at most, while it turns a little to the
-  // side.
+  // Place of a probe that goes up and down over the ball's top, at most 4 mm deep, and also swings a little
+  // sideways.
   static glm::dvec3 position(double t_s) {
     const double height = 0.024 - 0.006 * std::sin(2.0 * std::numbers::pi * t_s);
     const double aside = 0.3 * std::sin(2.0 * std::numbers::pi * 0.5 * t_s);
     return height * glm::dvec3(std::sin(aside), 0.0, std::cos(aside));
   }
-  // What a ball of that stiffness answers a ball with.
+  // The force of a ball of this stiffness on the probe's ball (N).
   static glm::dvec3 answer(const glm::dvec3& p) {
     const double depth = kRadius_m + kTool_m - glm::length(p);
     return depth > 0.0 ? kStiffness_N_per_m * depth * glm::normalize(p) : glm::dvec3(0.0);
@@ -69,7 +69,7 @@ TEST_F(CompareMeasured, AMeasurementInClosedFormIsMet) {
   double most = 0.0;
   for (const auto& row : felt.rows) most = std::max(most, glm::length(row.force_N));
   EXPECT_GT(most, 1.9) << "or the test shows nothing";
-  // The path is linear between samples, of 0.04 mm each: nothing of it is lost at the samples themselves.
+  // The path is linear between samples, which are 0.04 mm apart. At the samples themselves it has no error.
   EXPECT_LT(result.rms_N, 1e-6);
   EXPECT_LT(felt.max_N, 1e-6);
   EXPECT_EQ(felt.share_above_1_jnd, 0.0);
@@ -103,8 +103,8 @@ TEST_F(CompareMeasured, ForcesOnTheObjectAreNoticedAndTurned) {
   EXPECT_LT(turned.rms_N, 1e-6);
 }
 
-// The evaluation's pipeline: forces measured on the surface, and the device driven below it by force /
-// stiffness (the in-trajectory), in a file of its own without forces.
+// The evaluation's pipeline: forces are measured on the surface. A separate file without forces, the
+// in-trajectory, drives the device below the surface by force / stiffness.
 TEST_F(CompareMeasured, AnInTrajectoryDrivesTheDevice) {
   std::string raw = "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N\n", in = "t_s,x_mm,y_mm,z_mm\n";
   for (int i = 0; i <= 1000; ++i) {
@@ -122,7 +122,7 @@ TEST_F(CompareMeasured, AnInTrajectoryDrivesTheDevice) {
   EXPECT_GT(compared(write("raw.csv", raw)).rms_N, 0.1) << "on the surface itself nothing presses";
 }
 
-// Another rate than the scene's, and a hole in it: what was not measured is not compared.
+// A measurement with a rate other than the scene's, and with a gap. Ticks in the gap are not compared.
 TEST_F(CompareMeasured, AnyRateAndGaps) {
   std::string text = "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N\n";
   for (int i = 0; i <= 480; ++i) {
@@ -135,14 +135,16 @@ TEST_F(CompareMeasured, AnyRateAndGaps) {
   const auto result = compared(write("240hz.csv", text));
   EXPECT_NEAR(static_cast<double>(result.in_gaps), 80.0 / 240.0 * 1000.0, 2.0);
   EXPECT_EQ(result.samples + result.in_gaps, 2001U);
-  // Position and force are linear between samples alike; what the ball's curvature and the edge of contact
-  // differ by over 4 ms: half of acceleration times time squared, 0.24 m/s^2 here, is 0.5 um, 0.3 mN.
+  // Position and force are both linear between samples, which are 4 ms apart. The remaining difference comes
+  // from the curvature of the ball and from the beginning of contact. Half the acceleration times the time
+  // squared, with 0.24 m/s^2, is 0.5 um or 0.3 mN.
   EXPECT_LT(result.rms_N, 5e-3);
   EXPECT_EQ(result.notes.size(), 1U);
   EXPECT_THAT(result.notes[0], testing::HasSubstr("1 gap"));
 }
 
-// A hand-held object handed over: no surface is touched, so the error is the measured force itself.
+// A recorded handover of a hand-held object. In the scene no surface is touched, so the error is the measured
+// force.
 TEST_F(CompareMeasured, ARealWrenchIsRead) {
   const auto folder = tests::shared_data("data/trajectories");
   SKIP_WITHOUT(folder);

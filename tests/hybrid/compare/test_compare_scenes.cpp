@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole scenes along one motion: their differences against what elasticity and geometry say.
+// Whole scenes along the same motion: their differences against elasticity and geometry.
 #include "hybrid/compare/compare_scenes.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ constexpr double kCoupling_N_per_m = 1500.0, kPressed_m = 3e-3;
 
 class CompareScenes : public tests::SceneFile {
  protected:
-  // A block of gel whose top lies at z = 5 mm. The path takes a ball of 4 mm kPressed_m into it.
+  // A block of gel with its top at z = 5 mm. The path presses a ball of 4 mm into it by kPressed_m.
   hybrid::Scene gel(const std::string& name, const std::string& young, const std::string& spacing,
                     const std::string& tool = "shape = \"ball\"\nradius = 4\n",
                     const std::string& to = "[0, 0, 6]") const {
@@ -41,7 +41,7 @@ class CompareScenes : public tests::SceneFile {
   }
 };
 
-// Force in the last tick in which the device is at its deepest.
+// Force in the last tick in which the device is at its lowest place (N).
 double held_N(const ComparedScene& scene) {
   double deepest = 1.0, force = 0.0;
   for (const auto& row : scene.rows) {
@@ -52,8 +52,8 @@ double held_N(const ComparedScene& scene) {
   return force;
 }
 
-// Force of tissue that is twice as stiff as one that gives `force_N`, in series with the coupling, if tissue
-// follows a power law of the depth.
+// Force (N) of tissue in series with the coupling, if the tissue is twice as stiff as tissue that gives
+// `force_N`. The tissue's force is a power law of the depth.
 double of_twice_the_stiffness(double force_N, double power) {
   const double depth_m = kPressed_m - force_N / kCoupling_N_per_m;
   double low = 0.0, high = 2.0 * force_N;
@@ -75,7 +75,7 @@ TEST_F(CompareScenes, ASceneCannotBeToldFromItself) {
   for (const ComparedScene& scene : c.scenes) {
     EXPECT_GT(scene.all.ticks, 400U);
     EXPECT_EQ(scene.all.ticks, scene.moving.ticks + scene.still.ticks);
-    EXPECT_GT(scene.still.ticks, 300U);  // the path holds for 0.4 s
+    EXPECT_GT(scene.still.ticks, 300U);  // the path has a hold of 0.4 s
     EXPECT_EQ(scene.all.max_jnd, 0.0);
     EXPECT_EQ(scene.direction_p99_deg.value_or(-1.0), 0.0);
     EXPECT_EQ(scene.onset_later_s.value_or(-1.0), 0.0);
@@ -90,7 +90,8 @@ TEST_F(CompareScenes, TwiceTheModulusIsFeltAsElasticitySays) {
   const ScenesComparison c = hybrid::compare_scenes(scenes, 0, {});
   const double soft_N = held_N(c.scenes[0]), stiff_N = held_N(c.scenes[1]);
   ASSERT_GT(soft_N, 0.1);
-  // Between a flat contact (power 1) and one that stiffens more than Hertz's (power 2).
+  // The force lies between that of a flat contact (power 1) and of one that stiffens more than Hertz's (power
+  // 2).
   EXPECT_GT(stiff_N, 0.98 * of_twice_the_stiffness(soft_N, 2.0));
   EXPECT_LT(stiff_N, 1.02 * of_twice_the_stiffness(soft_N, 1.0));
   const double jnd = (stiff_N - soft_N) / std::max(hybrid::kJndShare * soft_N, hybrid::kJndFloor_N);
@@ -110,7 +111,7 @@ TEST_F(CompareScenes, HalfTheSpacingIsEightTimesTheVoxelsAndAboutTheForce) {
   EXPECT_GT(c.scenes[1].memory_bytes, c.scenes[0].memory_bytes);
   const double coarse_N = held_N(c.scenes[0]), fine_N = held_N(c.scenes[1]);
   EXPECT_GT(c.scenes[1].all.max_jnd, 0.0);
-  EXPECT_NEAR(fine_N, coarse_N, 0.25 * coarse_N);  // the contact is four voxels across
+  EXPECT_NEAR(fine_N, coarse_N, 0.25 * coarse_N);  // the contact is only four voxels wide
   std::printf("half the spacing: %.3f N, then %.3f N\n", coarse_N, fine_N);
 }
 
@@ -118,8 +119,9 @@ TEST_F(CompareScenes, ALowerSurfaceIsFeltLaterByTheTimeToGetThere) {
   const std::vector scenes{ball("high.toml", "20"), ball("low.toml", "19")};
   const ScenesComparison c = hybrid::compare_scenes(scenes, 1000, {});
   ASSERT_TRUE(c.scenes[1].onset_later_s.has_value());
-  EXPECT_NEAR(*c.scenes[1].onset_later_s, 1e-3 / 0.05, 1.01e-3);    // 1 mm at 50 mm/s, to a tick
-  EXPECT_NEAR(c.scenes[0].peak_N - c.scenes[1].peak_N, 1.0, 0.02);  // 1 mm less at 1,000 N/m
+  EXPECT_NEAR(*c.scenes[1].onset_later_s, 1e-3 / 0.05,
+              1.01e-3);  // the time for 1 mm at 50 mm/s, within a tick
+  EXPECT_NEAR(c.scenes[0].peak_N - c.scenes[1].peak_N, 1.0, 0.02);  // 1 mm less depth at 1,000 N/m
   EXPECT_LT(c.scenes[1].direction_p99_deg.value_or(90.0), 3.0);
   EXPECT_EQ(c.scenes[1].soft_voxels, 0U);
 }
@@ -154,7 +156,7 @@ TEST_F(CompareScenes, AnotherToolIsRefusedAndAnotherPathIsSaid) {
   const ScenesComparison c = hybrid::compare_scenes(std::vector{one, deeper}, 0, {});
   ASSERT_EQ(c.notes.size(), 1U);
   EXPECT_THAT(c.notes.front(), HasSubstr("deeper has another path"));
-  EXPECT_EQ(c.scenes[1].all.max_jnd, 0.0);  // the path of the first is played
+  EXPECT_EQ(c.scenes[1].all.max_jnd, 0.0);  // both scenes play the path of the first
 }
 
 }  // namespace

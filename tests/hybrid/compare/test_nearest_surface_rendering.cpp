@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The force towards the nearest surface: what it is, and where it fails (thesis, Fig 18) while a proxy does
-// not (Fig 19).
+// The force towards the nearest surface: its values, and the cases in which it fails (thesis, Fig 18) but a
+// proxy does not (Fig 19).
 #include "hybrid/compare/nearest_surface_rendering.h"
 
 #include <gtest/gtest.h>
@@ -62,7 +62,7 @@ TEST(ClassicSurface, AMeshAndItsShapeAgree) {
   }
 }
 
-// A sheet without thickness: nothing tells its sides apart but the proxy.
+// A sheet without thickness. Only a proxy can tell its two sides apart.
 TEST(ClassicSurface, ASheetFlipsTheForceInItsMiddle) {
   const auto sheet = polygon::make_plane_surface(0.03);
   EXPECT_NEAR(on(*sheet, {0.0, 0.0, 1e-6}).force_N.z, kStiffness * kRadius, 1e-2);
@@ -140,7 +140,7 @@ TEST_F(ProxyOrNot, TheThinPlateThrowsTheToolOutBehindWithoutAProxy) {
     most = std::max(most, classic[n].force_N.z);
     least_proxy = std::min(least_proxy, proxy[n].force_N.z);
     if (n > 0) step = std::max(step, std::fabs(proxy[n].force_N.z - proxy[n - 1].force_N.z));
-    // The proxy's force is the whole depth's, on the side that the tool came from.
+    // The proxy's force is that of the whole depth, towards the side from which the tool came.
     const double depth = 2e-3 - proxy[n].device_m.z;
     ASSERT_NEAR(proxy[n].force_N.z, kStiffness * std::max(0.0, depth), 1e-6);
     ASSERT_GE(proxy[n].proxy_m.z, 2e-3 - 1e-9);
@@ -157,7 +157,7 @@ TEST_F(ProxyOrNot, NearAnEdgeTheForceTurnsOnlyWithoutAProxy) {
   const auto &proxy = model("mesh and proxy").rows, &classic = model("nearest-surface").rows;
   double jump = 0.0, step = 0.0, tilt = 0.0;
   for (std::size_t n = 1; n < proxy.size(); ++n) {
-    if (proxy[n].device_m.x > 19.9e-3) break;  // then nothing is left above the device to hold it
+    if (proxy[n].device_m.x > 19.9e-3) break;  // beyond the edge there is no face above the device
     jump = std::max(jump, glm::distance(classic[n].force_N, classic[n - 1].force_N));
     step = std::max(step, glm::distance(proxy[n].force_N, proxy[n - 1].force_N));
     tilt = std::max(tilt, glm::length(glm::dvec2(proxy[n].force_N)));
@@ -169,7 +169,7 @@ TEST_F(ProxyOrNot, NearAnEdgeTheForceTurnsOnlyWithoutAProxy) {
   EXPECT_LT(tilt, 1e-6) << "straight out of the face that the tool came through";
 }
 
-// Where it is right, the closed form still is the reference, and the nearest surface is as right.
+// Over a ball the closed form is valid and is the reference. The nearest surface agrees with it.
 TEST_F(ProxyOrNot, OverABallAllAgree) {
   hybrid::Scene scene;
   scene.tool.radius_m = kRadius;
@@ -179,7 +179,7 @@ TEST_F(ProxyOrNot, OverABallAllAgree) {
   scene.path = device::PressPath{.from_m = {0.0, 0.0, 0.03}, .to_m = {0.0, 0.0, 0.018}};
   comparison_ = hybrid::compare_models(scene, "", {});
   EXPECT_EQ(comparison_.models[comparison_.reference].name, "rigid closed form");
-  // Felt as a mesh: 2.4 N, turned by up to 2.6 degrees by its facets.
+  // The ball is felt as a mesh. Its facets turn the force of 2.4 N by up to 2.6 degrees.
   EXPECT_LT(model("nearest-surface").max_N, 0.12);
 }
 

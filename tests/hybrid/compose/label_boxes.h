@@ -9,7 +9,7 @@
 
 namespace tests {
 
-// Boxes of labels; later ones win.
+// A box of voxels with a label. Later boxes overwrite earlier ones.
 struct LabelBox {
   std::array<int, 3> low, high;  // inclusive
   std::uint8_t label;
@@ -31,7 +31,7 @@ inline voxel::LabelVolume volume_of(const std::vector<LabelBox>& boxes, double s
   return volume;
 }
 
-// A liver with a rib before it and a vertebra behind it; a spleen that touches nothing; a speck of spleen.
+// A liver between a rib and a vertebra, a spleen that touches nothing, and a speck of spleen.
 inline std::vector<LabelBox> torso() {
   return {{{8, 12, 8}, {31, 27, 23}, 1},
           {{8, 8, 8}, {13, 11, 23}, 2},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `hybrid compose`: what becomes what, that the scene it writes is felt, and what it refuses.
+// `hybrid compose`: the objects that it makes, the touch of the written scene, and its refusals.
 #include "hybrid/compose/compose.h"
 
 #include <gmock/gmock.h>
@@ -58,7 +58,7 @@ class Compose : public tests::SceneFile {
     options.out = folder_ / "out";
     return options;
   }
-  // What a refusal says; empty when nothing was refused.
+  // The text of the refusal; empty if nothing is refused.
   static std::string refused(const ComposeOptions& options) {
     try {
       (void)hybrid::compose(options);
@@ -77,7 +77,7 @@ class Compose : public tests::SceneFile {
   fs::path names_, labels_;
 };
 
-// Ticks in which each object is touched along the scene's own path.
+// [object] number of ticks in which it is touched along the scene's own path.
 std::map<std::string, std::uint64_t> touched(const fs::path& file) {
   const hybrid::Scene scene = hybrid::load_scene(file);
   hybrid::BuiltScene built = hybrid::build_scene(scene);
@@ -120,7 +120,7 @@ TEST_F(Compose, BonesBecomeSurfacesAndTheRestTissueAndEachIsFelt) {
   EXPECT_EQ(row(composed, "spleen").young_Pa, 2900.0);
   EXPECT_NEAR(row(composed, "liver").size_m.x, 0.048, 1e-12);
   EXPECT_EQ(row(composed, "rib_left_1").voxels, 6U * 4U * 16U);
-  // The surface lies where the labels do: 12 x 8 x 32 mm, within a voxel's smoothing.
+  // The surface lies where the labels are, with 12 x 8 x 32 mm, within the smoothing of one voxel.
   const auto rib = polygon::load_mesh(composed.scene.parent_path() / "rib_left_1.ply").mesh;
   glm::dvec3 low(1e300), high(-1e300);
   for (const glm::dvec3& v : rib.vertices) {
@@ -149,14 +149,14 @@ TEST_F(Compose, TissueThatTouchesNothingRigidIsHeldAndSpecksGo) {
   EXPECT_TRUE(scene.soft[0].anchors.faces.empty());
   const std::uint8_t held = scene.soft[0].anchors.labels[0];
   EXPECT_EQ(scene.soft[0].materials.at(held), "spleen");
-  // The layer nearest to the back of the spleen: 8 x 16 voxels at j = 27.
+  // The held layer is the rearmost layer of the spleen: 8 x 16 voxels at j = 27.
   const auto& source = std::get<hybrid::VolumeSource>(scene.soft[0].source);
   const voxel::LabelVolume volume = voxel::load_volume(source.file, {});
   EXPECT_EQ(std::count(volume.labels.begin(), volume.labels.end(), held), 8 * 16);
   EXPECT_EQ(std::count(volume.labels.begin(), volume.labels.end(), 4), 8 * 15 * 16);
   EXPECT_EQ(std::count(volume.labels.begin(), volume.labels.end(), 1), 24 * 16 * 16);
   EXPECT_EQ(volume.voxel_count(), 35U * 16U * 16U) << "cropped to what is soft";
-  // Every tissue is held by something of its own: it comes back to rest.
+  // The liver has anchors too, at the bones, so that all tissue returns to rest.
   hybrid::BuiltScene built = hybrid::build_scene(scene);
   EXPECT_GT(built.state->soft[0]->lattice().anchored_count(), static_cast<std::size_t>(8 * 16));
 }
@@ -175,7 +175,8 @@ TEST_F(Compose, WithoutBoneTissueIsHeldAtTheBack) {
 
 TEST_F(Compose, NamesPatternsAndNumbersChoose) {
   ComposeOptions options = of_torso();
-  options.rigid = {"RIB_*,3"};  // the program splits at commas; here they are one word, which fits nothing
+  options.rigid = {
+      "RIB_*,3"};  // only the program splits at commas; here this is one pattern, which fits no label
   EXPECT_THAT(refused(options), HasSubstr("no label fits"));
   options.rigid = {"RIB_*", "3"};
   options.soft = {"l?ver"};
@@ -238,7 +239,7 @@ TEST_F(Compose, TissueIsReadCoarserWhereAskedAndBoneIsNot) {
 // ---- from meshes and volumes
 
 TEST_F(Compose, AMeshIsPlacedInAVolume) {
-  auto part = polygon::make_box_mesh({10, 10, 10}, 4);  // half edges; in mm, as meshes are read
+  auto part = polygon::make_box_mesh({10, 10, 10}, 4);  // half edges in mm, the unit in which meshes are read
   polygon::save_ply(folder_ / "part.ply", part);
   voxel::LabelVolume head = volume_of({{{4, 4, 4}, {39, 35, 27}, 200}});
   ComposeOptions options;
@@ -268,7 +269,7 @@ TEST_F(Compose, WhatLiesFarAwayIsSaid) {
   EXPECT_THAT(all(composed.notes), HasSubstr("if the file is in meters"));
 }
 
-// ---- from nothing
+// ---- the starter scene
 
 TEST_F(Compose, TheStarterSceneRuns) {
   ComposeOptions options;
@@ -290,7 +291,8 @@ TEST_F(Compose, NothingIsOverwrittenUnasked) {
               AllOf(HasSubstr("scene.toml"), HasSubstr("is there already"), HasSubstr("--force")));
   EXPECT_EQ(text_of(options.out / "scene.toml"), "mine");
   fs::remove(options.out / "scene.toml");
-  // Nor another file of the folder; and what had been written until then goes again.
+  // Other files of the folder are not overwritten either. Files that were written before the refusal are
+  // removed.
   write("out/vertebrae_L1.ply", "mine too");
   EXPECT_THAT(refused(options), AllOf(HasSubstr("vertebrae_L1.ply"), HasSubstr("is there already")));
   EXPECT_EQ(text_of(options.out / "vertebrae_L1.ply"), "mine too");
@@ -391,7 +393,7 @@ TEST_F(Compose, NamesThatCannotBeReadSayTheirRow) {
   EXPECT_THAT(refused(options), HasSubstr("is no JSON"));
 }
 
-// The same voxels, counted from the other end of an axis: a flip that formats make.
+// The scan's frame counts the same voxels from the other end of two axes, as some formats do.
 TEST_F(Compose, AGridThatIsCountedFromAnotherEndIsTheSameGrid) {
   voxel::LabelVolume scan = volume_of(torso());
   const glm::dvec3 far = glm::dvec3(scan.dims[0] - 1, scan.dims[1] - 1, 0) * scan.spacing_m;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tissue of composed scenes: its spacing, its stiffness, its names, and how much of the path is in
+// The tissue of composed scenes: its spacing, stiffness and names, and the part of the path that is in
 // contact.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -69,11 +69,12 @@ TEST_F(ComposedTissue, ThickSlicesAreReadAtTheSameSpacingAlongAllAxes) {
     const Composed composed = hybrid::compose(options);
     const hybrid::BuiltScene built = hybrid::build_scene(hybrid::load_scene(composed.scene));
     const glm::dvec3 h = built.state->soft[0]->lattice().spacing_m();
-    const bool uneven = slice_mm != 2.4;  // within a quarter: as it is
+    const bool uneven = slice_mm != 2.4;  // spacings that differ by less than a quarter are kept
     EXPECT_EQ(notes_of(composed).find("along all axes") != std::string::npos, uneven) << notes_of(composed);
     EXPECT_THAT(build_notes(built), Not(HasSubstr("slices of")));
     if (uneven) {
-      // As many voxels: the cube root of 2 x 2 x slice, rounded up to two digits.
+      // The number of voxels stays about the same: the spacing is the cube root of 2 x 2 x slice, rounded up
+      // to two digits.
       const double wanted_mm = std::ceil(10.0 * std::cbrt(4.0 * slice_mm) - 1e-9) / 10.0;
       EXPECT_NEAR(h.x, wanted_mm * 1e-3, 1e-9);
       EXPECT_NEAR(h.z, h.x, 1e-12);
@@ -135,7 +136,8 @@ TEST_F(ComposedTissue, LinksGetTheRatioForWhichTheyAreRightAndTheSameContactModu
   EXPECT_EQ(liver.poisson, 0.3);
   EXPECT_FALSE(liver.energy.has_value());
   EXPECT_NEAR(liver.young_Pa / (1.0 - 0.3 * 0.3), 5500.0 / (1.0 - 0.45 * 0.45), 1.0);
-  // Cartilage has a lower ratio, which nested patches beside other tissue do not take.
+  // Cartilage has a lower Poisson's ratio. Nested patches do not support another ratio beside other tissue,
+  // so it is replaced too.
   const hybrid::LatticeStiffness stiff = hybrid::as_six_links(*hybrid::find_tissue("costal_cartilages"));
   EXPECT_EQ(stiff.poisson, 0.3);
   EXPECT_NEAR(stiff.young_Pa / (1.0 - 0.3 * 0.3), 7.0e5 / (1.0 - 0.1 * 0.1), 1.0);
@@ -144,7 +146,7 @@ TEST_F(ComposedTissue, LinksGetTheRatioForWhichTheyAreRightAndTheSameContactModu
 // ---- a volume without labels
 
 TEST_F(ComposedTissue, BoneOfAScanWithoutLabelsIsSaidUnlessToldWhatIsTissue) {
-  // A cube of 12 voxels a side of 40 HU in air; its core of 4 voxels a side is bone.
+  // A cube of 40 HU in air, with 12 voxels a side. Its core, with 4 voxels a side, is bone.
   std::string data;
   for (int k = 0; k < 20; ++k) {
     for (int j = 0; j < 20; ++j) {

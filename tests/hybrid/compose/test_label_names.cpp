@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Names of labels from tables and JSON, and the tissues that are known by their names.
+// Names of labels from tables and JSON, and the tissues that are recognised by their names.
 #include "hybrid/compose/label_names.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ using hybrid::LabelNames;
 
 const LabelNames kThree{{1, "femur_left"}, {2, "liver"}, {3, "rib left 5"}};
 
-// A file of names in a folder of its own, removed with it.
+// A file of names in a temporary folder, which is removed at the end.
 class NamesFile {
  public:
   NamesFile(const std::string& name, const std::string& bytes)
@@ -38,7 +38,7 @@ class NamesFile {
   NamesFile& operator=(const NamesFile&) = delete;
 
   [[nodiscard]] const fs::path& path() const { return file_; }
-  // Why it is refused; empty if it is read.
+  // The text of the refusal; empty if the file is read.
   [[nodiscard]] std::string refusal() const {
     try {
       (void)hybrid::read_label_names(file_);

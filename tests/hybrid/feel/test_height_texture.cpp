@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Height maps as functions: wavelength, slope and energy; every bad image is refused with a clear text.
+// Height maps as functions: wavelength, slope and energy. Every bad image is refused with a clear text.
 #include "hybrid/feel/height_texture.h"
 
 #include <gtest/gtest.h>
@@ -80,7 +80,7 @@ TEST(HeightTexture, HeightAndSlopeRunOnAcrossPixelsAndPeriods) {
       EXPECT_NEAR(a.slope.y, b.slope.y, 1e-5);
     }
     EXPECT_NEAR(texture.sample(0.2 + n, 0.4).height, texture.sample(0.2, 0.4).height, 1e-12);
-    // Seven by five pixels: the period along v is 5/7 of that along u.
+    // With seven by five pixels, the period along v is 5/7 of the period along u.
     EXPECT_NEAR(texture.sample(0.2, 0.4 + n * 5.0 / 7.0).height, texture.sample(0.2, 0.4).height, 1e-12);
   }
 }
@@ -91,7 +91,8 @@ TEST(HeightTexture, AnImageOfAWaveIsThatWave) {
   for (int i = 0; i < pixels; ++i)
     image.grey.push_back(static_cast<float>(0.5 + 0.5 * std::cos(2.0 * kPi * (i + 0.5) / pixels)));
   const HeightTexture texture(image, {.size_m = 1.0, .height_m = 1.0});
-  const double kept = (2.0 + std::cos(2.0 * kPi / pixels)) / 3.0;  // share that the spline keeps: 0.994
+  const double kept =
+      (2.0 + std::cos(2.0 * kPi / pixels)) / 3.0;  // fraction of the amplitude that the spline keeps: 0.994
   for (int n = 0; n < 100; ++n) {
     const double u = 0.01 * n;
     EXPECT_NEAR(texture.sample(u, 0.0).height, 0.5 + 0.5 * kept * std::cos(2.0 * kPi * u), 2e-5);
@@ -99,8 +100,8 @@ TEST(HeightTexture, AnImageOfAWaveIsThatWave) {
 }
 
 TEST(HeightTexture, LiesUprightAndMirroredNowhere) {
-  // Bright in the upper right quarter of one period. Seen from +z with x to the right, the image's corner is
-  // at the origin, and its rows run towards −y.
+  // The image is bright in the upper right quarter of one period. Seen from +z with x to the right, the
+  // image's upper left corner is at the origin, and its rows follow one another towards −y.
   hybrid::GreyImage image{8, 8, std::vector<float>(64, 0.0F)};
   for (std::size_t row = 0; row < 4; ++row)
     for (std::size_t column = 4; column < 8; ++column) image.grey[row * 8 + column] = 1.0F;
@@ -131,7 +132,8 @@ TEST(HeightTexture, TheGradientInTheBodyIsTheReliefsDerivative) {
   }
 }
 
-// Force on the hand at x over the plane z = 0 in some orientation, contact and texture together.
+// Force of contact and texture together on the hand at x, over a plane through the origin with the given
+// normal (N).
 glm::dvec3 felt(const HeightTexture& texture, const glm::dvec3& x, const glm::dvec3& normal) {
   const double depth = -glm::dot(x, normal);
   if (depth <= 0.0) return glm::dvec3(0.0);
@@ -153,7 +155,7 @@ TEST(HeightTexture, AFlatReliefIsConservative) {
             std::max(0.0, depth + hybrid::relief_at(texture, x + depth * normal, normal).height_m);
         return 0.5 * kStiffness * into * into;
       };
-      for (int n = 0; n < 300; ++n) {  // force = −∇ potential
+      for (int n = 0; n < 300; ++n) {  // checks force = −∇ potential
         const glm::dvec3 x = 2e-3 * glm::dvec3(unit(random), unit(random), unit(random)) - 1e-3 * normal;
         const glm::dvec3 f = felt(texture, x, normal);
         for (glm::length_t axis = 0; axis < 3; ++axis) {
@@ -162,7 +164,8 @@ TEST(HeightTexture, AFlatReliefIsConservative) {
           ASSERT_NEAR(f[axis], -(potential(x + e) - potential(x - e)) / 2e-8, 1e-5);
         }
       }
-      // Around a closed path, in and out of contact: three-point Gauss-Legendre on short pieces.
+      // Work around a closed path, in and out of contact, by three-point Gauss-Legendre quadrature on short
+      // pieces.
       const glm::dvec3 a = 3e-3 * glm::dvec3(unit(random), unit(random), unit(random)),
                        b = 3e-3 * glm::dvec3(unit(random), unit(random), unit(random));
       const auto at = [&](double s) {
@@ -339,7 +342,7 @@ TEST_F(TextureImage, AnyDamageIsRefusedAndNothingCrashes) {
 
 TEST_F(TextureImage, ASizeBeyondTheLimitIsRefusedBeforeItIsAllocated) {
   std::string png_text = contents(png<std::uint8_t>(1, 1, PNG_FORMAT_GRAY, {7}));
-  // Width and height in the header, with a valid checksum.
+  // Writes a width and height into the header, with a valid checksum.
   const auto claim = [&](std::uint32_t width, std::uint32_t height) {
     std::string text = png_text;
     const auto put = [&text](std::size_t at, std::uint32_t value) {

@@ -115,14 +115,14 @@ TEST(Friction, ComesToRestOnlyInTheDynamicConeAndHoldsThereAgain) {
   rub.to({0.65 * depth, 0.0, -depth});
   EXPECT_TRUE(rub.sliding);
   const glm::dvec3 rest = rub.p;
-  rub.to({0.65 * depth, 0.0, -depth});  // the hand stays: the pull is on the dynamic cone
+  rub.to({0.65 * depth, 0.0, -depth});  // the hand stays, so the pull is on the dynamic cone
   EXPECT_FALSE(rub.sliding);
   EXPECT_NEAR(rub.p.x, rest.x, 1e-15);
-  rub.to({0.80 * depth, 0.0, -depth});  // 0.55 of the depth from the proxy: the static cone holds
+  rub.to({0.80 * depth, 0.0, -depth});  // 0.55 of the depth from the proxy, within the static cone
   EXPECT_FALSE(rub.sliding);
-  rub.to({0.90 * depth, 0.0, -depth});  // 0.65
+  rub.to({0.90 * depth, 0.0, -depth});  // 0.65 of the depth from the proxy
   EXPECT_TRUE(rub.sliding);
-  rub.to({0.89 * depth, 0.0, -depth});  // reversed: at rest
+  rub.to({0.89 * depth, 0.0, -depth});  // the motion is reversed, so it comes to rest
   EXPECT_FALSE(rub.sliding);
 }
 
@@ -145,7 +145,7 @@ TEST(Friction, WithAnyMetricTheSlideEndsOnTheCone) {
     }
     const glm::dvec3 pull = plane.metric * (t - q);
     const double pressed = -pull.z, held = glm::length(glm::dvec3(pull.x, pull.y, 0.0));
-    if (step.target == t) {  // no contact: the proxy lifts off or just touches
+    if (step.target == t) {  // no force: the proxy lifts off or just touches
       ++lifted;
       ASSERT_LE(pressed, 1e-9);
       continue;
@@ -171,7 +171,7 @@ TEST(Friction, IsContinuousAtTheDynamicCone) {
       return glm::length(polygon::minimise_on_planes(step.target, metric, std::span(&plane, 1), 1e-18).point);
     };
     const double a = glm::dot(up, compliance[0]) / glm::dot(up, compliance[2]);
-    if (1.0 - mu * a < 0.2) continue;  // near jamming a small force change means a long travel
+    if (1.0 - mu * a < 0.2) continue;  // near jamming, a small change of the force causes a long travel
     EXPECT_EQ(slide(-1e-9), 0.0);
     EXPECT_LT(slide(1e-9), 1e-9);
     EXPECT_NEAR(slide(1e-4), 10.0 * slide(1e-5), 1e-3 * slide(1e-4));
@@ -202,8 +202,8 @@ TEST(Friction, NothingToPressOnOrNothingToHold) {
   EXPECT_EQ(friction_target(into, into, metric, up, 0.5, 0.4, true).target, into);
 }
 
-// A closed path of the hand, with the proxy fixed between two ticks, so that the coupling is a spring and its
-// work exact. The hand's work must equal the stored energy at the end plus the friction loss.
+// Moves the hand around closed paths. The proxy is fixed between two ticks, so the coupling is a spring, and
+// its work is exact. The work that is not stored at the end is the friction loss, and must not be negative.
 template <typename Surface>
 void expect_no_energy_from_closed_paths(const Surface& surface, const glm::dvec3& middle, double reach) {
   std::mt19937 random(11);
@@ -225,7 +225,8 @@ void expect_no_energy_from_closed_paths(const Surface& surface, const glm::dvec3
     Rubbed<Surface> rub{.surface = surface, .static_friction = mu, .dynamic_friction = mu * 0.7};
     rub.start(at(0.0));
     const int ticks = 400;
-    for (int n = 1; n <= ticks; ++n) rub.to(at(static_cast<double>(n) / ticks));  // into the limit cycle
+    for (int n = 1; n <= ticks; ++n)
+      rub.to(at(static_cast<double>(n) / ticks));  // the first round leads into the limit cycle
     const double before = rub.energy(rub.t);
     double work = 0.0, moved = 0.0;
     for (int n = 1; n <= ticks; ++n) {
@@ -260,7 +261,7 @@ TEST(Friction, NoClosedPathOnASphereGainsEnergy) {
 TEST(Friction, OnASphereTheSlideConvergesToTheConeThere) {
   Rubbed<Sphere> rub{.surface = {}, .static_friction = 0.5, .dynamic_friction = 0.4};
   rub.start({0.0, 0.0, 0.045});
-  for (int n = 1; n <= 400; ++n) {  // 20 mm/s along a circle 5 mm deep
+  for (int n = 1; n <= 400; ++n) {  // 20 mm/s along a circle at a depth of 5 mm
     const double a = n * 2e-5 / 0.045;
     rub.to(0.045 * glm::dvec3(std::sin(a), 0.0, std::cos(a)));
     if (!rub.sliding || n < 390) continue;
@@ -308,7 +309,7 @@ TEST(Damping, EncoderStepsAreNotFelt) {
       const double felt = rate.add(depth, dt, step);
       if (n > 20) worst = std::max(worst, std::fabs(felt - speed));
     }
-    // One step over one tick is 30 mm/s.
+    // One encoder step per tick would be 30 mm/s.
     EXPECT_LE(worst, 0.015) << speed;
     EXPECT_TRUE(speed > 0.0 || worst == 0.0);
     std::printf("steps of 0.03 mm at %.0f mm/s: the rate is off by at most %.1f mm/s\n", 1e3 * speed,
@@ -336,12 +337,13 @@ TEST(Damping, NeverPullsTheToolIn) {
   }
 }
 
-// For any motion the toll doubles, so in 1000 ticks the hand receives at most ten times the work of one tick.
+// After each suspension the damper must earn twice as much to resume (surface_feel.h). So in 1000 ticks the
+// hand receives at most ten times the work of one tick.
 TEST(Damping, FeedsNoOscillation) {
   const double dt = 1e-3, resolution = 3e-5;
   for (const double noise : {0.0, resolution}) {
     for (int n_th = 0; n_th < 42; ++n_th) {
-      const double hertz = 3.0 * std::pow(1.13, n_th);  // to 450 Hz
+      const double hertz = 3.0 * std::pow(1.13, n_th);  // up to 450 Hz
       for (const double amplitude : {2e-5, 1e-4, 1e-3}) {
         hybrid::DampingState state;
         double given = 0.0, one_tick = 0.0, before = 0.0, extra = 0.0;
@@ -371,8 +373,8 @@ TEST(Damping, WhatIsNotFiniteIsForgotten) {
 
 // ---- shading
 
-// A flat face rendered as the sphere of `radius` through its middle. Exact result: the proxy is where the
-// sphere's normal points at the device, seen from the sphere's centre.
+// A flat face is shaded like the sphere of `radius` through its middle. The exact force has the direction
+// from the sphere's centre to the device.
 TEST(Shading, AFlatFaceFeelsLikeTheSphereItStandsFor) {
   const double radius = 0.05;
   double worst_deg = 0.0;
@@ -415,7 +417,7 @@ TEST(Shading, NormalsThatSpanEverythingOrNothingLeaveTheMetricsMinimumFree) {
     const glm::dmat3 all = hybrid::shading_metric(metric, {normals.data(), count});
     for (int d = 0; d < 3; ++d) EXPECT_NEAR(glm::distance(all[d], metric[d]), 0.0, 1e-3 * metric[d][d]);
   }
-  // The same normal twice is that normal.
+  // A repeated normal counts once.
   const std::array<glm::dvec3, 2> twice{up, up};
   const glm::dmat3 once = hybrid::shading_metric(metric, {&up, 1}),
                    again = hybrid::shading_metric(metric, twice);

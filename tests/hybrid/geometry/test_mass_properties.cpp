@@ -36,7 +36,7 @@ polygon::TriangleMesh placed(polygon::TriangleMesh mesh, const dvec3& position, 
   return mesh;
 }
 
-// A prism of n sides about z, whose inertia tends to a cylinder's.
+// A prism with n sides about z. Its inertia tends to that of a cylinder.
 polygon::TriangleMesh cylinder(double radius, double length, std::uint32_t n) {
   polygon::TriangleMesh mesh;
   for (std::uint32_t k = 0; k < n; ++k) {
@@ -86,7 +86,7 @@ TEST(MassProperties, OfACylinderMeshAreThoseOfTheCylinder) {
 TEST(MassProperties, OfACapsuleMeshTendToThoseOfTheCapsule) {
   expect_same(hybrid::mass_of_mesh(polygon::make_capsule_mesh(0.02, 0.03, 300), 900.0),
               hybrid::mass_of_capsule(0.02, 0.06, 900.0), 5e-4);
-  // Without a middle part it is a ball.
+  // A capsule without a middle part is a ball.
   expect_same(hybrid::mass_of_capsule(0.02, 0.0, 900.0), hybrid::mass_of_ball(0.02, 900.0), 1e-14);
 }
 
@@ -98,7 +98,7 @@ TEST(MassProperties, GoWithThePoseOfTheMesh) {
     const dvec3 position(away, -2.0 * away, 0.5 * away);
     const MassProperties box = hybrid::mass_of_box(size, 1000.0);
     const MassProperties exact{box.mass_kg, position, r * box.inertia_kg_m2 * glm::transpose(r)};
-    // An offset of kilometers costs the digits that its coordinates have lost, and no more.
+    // With an offset of kilometers, only the digits are lost that the coordinates have lost.
     expect_same(
         hybrid::mass_of_mesh(placed(polygon::make_box_mesh(0.5 * size, 2), position, rotation), 1000.0),
         exact, 1e-11 + 1e-13 * away);

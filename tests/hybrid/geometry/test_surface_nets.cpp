@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces from labels, largest pieces and grown labels, against brute force and exact volumes.
+// Surfaces from labels, the largest piece and grown labels, against brute force and exact volumes.
 #include "hybrid/geometry/surface_nets.h"
 
 #include <gtest/gtest.h>
@@ -33,10 +33,11 @@ using tests::refusal;
 using tests::signed_volume;
 using voxel::LabelVolume;
 
-// Each directed edge occurs once, and its opposite once: the mesh is closed and oriented, with two triangles
-// per edge. The triangles of each vertex form one fan: a walk from edge to edge meets all of them.
+// Expects a closed, oriented manifold. Each directed edge and its opposite occur once, so an edge has two
+// triangles. The triangles of each vertex form one fan, so a walk from edge to edge meets all of them.
 void expect_manifold(const TriangleMesh& mesh) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> next;  // directed edge to the third vertex
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>
+      next;  // third vertex of the triangle at a directed edge
   std::vector<std::size_t> triangles_at(mesh.vertices.size());
   for (const auto& t : mesh.triangles) {
     for (std::size_t n = 0; n < 3; ++n) {
@@ -101,7 +102,7 @@ TEST(LabelSurface, BallKeepsItsVolumeAndRadiusWhenSmoothed) {
         worst = std::max(worst, error);
         sum += error * error;
       }
-      EXPECT_LT(worst, 1.0) << radius << ' ' << passes;  // of a spacing
+      EXPECT_LT(worst, 1.0) << radius << ' ' << passes;  // in spacings
       const double rms = std::sqrt(sum / static_cast<double>(mesh.vertices.size()));
       EXPECT_LT(rms, passes < 5 ? 0.4 : 0.25) << radius << ' ' << passes;
     }
@@ -238,8 +239,8 @@ TEST(LabelSurface, IsManifoldForEveryNeighbourhoodOfEightAndForNoise) {
     });
     expect_manifold(hybrid::surface_from_labels(volume, 0));
   }
-  for (unsigned bits = 0; bits < 4096;
-       ++bits) {  // the 12 voxels of two cells that share a face; solid or empty around them
+  for (unsigned bits = 0; bits < 4096; ++bits) {  // all patterns of the 12 voxels of two cells that share a
+                                                  // face; the voxels around them are solid or empty
     for (const bool shell : {false, true}) {
       const LabelVolume volume = filled(empty_volume(4, 4, 5), [&](int i, int j, int k) {
         if (i < 1 || i > 2 || j < 1 || j > 2 || k < 1 || k > 3) return shell;
@@ -280,7 +281,7 @@ TEST(LabelSurface, EmptyVolumesGiveEmptyMeshes) {
 
 // ---- keep_largest_piece
 
-// Flood fill with an explicit stack: the slow, simple reference.
+// The slow and simple reference: flood fill with an explicit stack.
 std::vector<int> pieces_by_flood(const LabelVolume& volume, bool empty, std::vector<std::size_t>& sizes) {
   std::vector<int> piece(volume.labels.size(), -1);
   for (int k = 0; k < volume.dims[2]; ++k) {
@@ -397,7 +398,7 @@ TEST(GrowLabels, AgreesWithBruteForceOnAnyLattice) {
         }
       }
     }
-    // Another layer anywhere would add nothing.
+    // Growing again by 0 adds nothing.
     EXPECT_EQ(count(hybrid::grow_labels(grown, 0.0)), count(grown));
     for (int axis = 0; axis < 3; ++axis) {
       const int steps = static_cast<int>(std::floor(distance / volume.spacing_m[axis]));
@@ -410,7 +411,8 @@ TEST(GrowLabels, AgreesWithBruteForceOnAnyLattice) {
 TEST(GrowLabels, OneVoxelBecomesABall) {
   const LabelVolume one = filled(empty_volume(1, 1, 1, glm::dvec3(1e-3)), [](int, int, int) { return true; });
   const LabelVolume grown = hybrid::grow_labels(one, 20e-3);
-  EXPECT_EQ(grown.dims, (std::array{41, 41, 41}));  // centres exactly at the distance are included
+  EXPECT_EQ(grown.dims,
+            (std::array{41, 41, 41}));  // voxels with centres exactly at the distance are included
   EXPECT_EQ(grown.labels[grown.index(0, 20, 20)], 1);
   const double exact = 4.0 / 3.0 * std::numbers::pi * 8000.0;
   EXPECT_NEAR(static_cast<double>(count(grown)), exact, 0.01 * exact);
@@ -444,7 +446,8 @@ TEST(LabelSurface, SevenMillionVoxelsTakeAboutASecond) {
   total += timed("pieces", [&] { hybrid::keep_largest_piece(kept, true); });
   total += timed("grow", [&] { hybrid::grow_labels(volume, 5.0); });
   total += timed("voxelise", [&] { hybrid::voxelise_mesh(mesh, glm::dvec3(1.0), 1, 10'000'000); });
-  EXPECT_LT(total, 60.0);  // generous for sanitizers and shared machines; the figures are printed
+  EXPECT_LT(total,
+            60.0);  // seconds; a wide bound for sanitizers and shared machines, as the times are printed
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Voxelised meshes against exact volumes, against the labels that a surface came from, and on damaged meshes.
+// Voxelised meshes against exact volumes and against the labels from which a surface was made. Also damaged
+// meshes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,7 +44,7 @@ TEST(VoxeliseMesh, AlignedBoxIsExact) {
 }
 
 TEST(VoxeliseMesh, RowsThroughEdgesAndVerticesCountRight) {
-  // An octahedron whose equator, edges and tips all are on rows of centres.
+  // An octahedron whose equator, edges and tips all lie on rows of voxel centres.
   TriangleMesh mesh;
   mesh.vertices = {{4, 0, 0}, {-4, 0, 0}, {0, 4, 0},          {0, -4, 0},
                    {0, 0, 4}, {0, 0, -4}, {-4.5, -4.5, -4.5}, {4.5, 4.5, 4.5}};
@@ -54,7 +55,7 @@ TEST(VoxeliseMesh, RowsThroughEdgesAndVerticesCountRight) {
     mesh.triangles.push_back({3, 0, z});
   }
   mesh.triangles.push_back(
-      {6, 6, 7});  // without area: only widens the lattice, so that centres are whole numbers
+      {6, 6, 7});  // has no area; only widens the lattice, so that centres are whole numbers
   mesh.triangles.push_back({6, 6, 7});
   const LabelVolume volume = hybrid::voxelise_mesh(mesh, glm::dvec3(1.0), 1, 100'000);
   ASSERT_EQ(volume.dims, (std::array{9, 9, 9}));
@@ -62,7 +63,8 @@ TEST(VoxeliseMesh, RowsThroughEdgesAndVerticesCountRight) {
     for (int j = 0; j < 9; ++j) {
       for (int i = 0; i < 9; ++i) {
         const int distance = std::abs(i - 4) + std::abs(j - 4) + std::abs(k - 4);
-        if (distance == 4) continue;  // on the surface: either answer, as long as the row's parity is right
+        if (distance == 4)
+          continue;  // on the surface both answers are right, if the rest of the row is right
         ASSERT_EQ(volume.labels[volume.index(i, j, k)], distance < 4 ? 1 : 0) << i << j << k;
       }
     }
@@ -74,8 +76,8 @@ TEST(VoxeliseMesh, SurfaceOfLabelsGivesTheLabelsBack) {
     LabelVolume volume = noise(8, 7, 6, 0.3, seed);
     volume.spacing_m = {1e-3, 2e-3, 0.5e-3};
     const TriangleMesh mesh = hybrid::surface_from_labels(volume, 0);
-    // The lattice is centred on the mesh, whose box is a whole number of voxels, so the centres coincide.
-    // Cells that two sheets share have a moved vertex; it stays well clear of the centres.
+    // The lattice is centred on the mesh, and the mesh's box has a whole number of voxels, so the centres
+    // coincide. In cells that two sheets share a vertex is moved, but not near to a centre.
     const LabelVolume back = hybrid::voxelise_mesh(mesh, volume.spacing_m, 1, 1'000'000);
     EXPECT_EQ(count(back), count(volume)) << seed;
   }
@@ -90,7 +92,7 @@ TEST(VoxeliseMesh, TurnedBallHasItsVolume) {
     const LabelVolume volume = hybrid::voxelise_mesh(mesh, {0.7, 0.9, 0.8}, 1, 10'000'000);
     const double expected = signed_volume(mesh);
     EXPECT_NEAR(static_cast<double>(count(volume)) * cell_volume(volume), expected, 0.005 * expected);
-    // Wrong parity would fill a row to its end, so the border of the box must be nearly empty.
+    // A wrong parity would fill a row to its end. So the border of the box must be empty.
     for (int k = 0; k < volume.dims[2]; ++k) {
       EXPECT_EQ(volume.labels[volume.index(volume.dims[0] - 1, 0, k)], 0);
     }
@@ -116,7 +118,7 @@ TEST(VoxeliseMesh, InsideOutAndSoupsAreClosedToo) {
 }
 
 TEST(VoxeliseMesh, FarAwayAndMixedSpacings) {
-  const double far = 1e6;  // 1,000 km: a double still resolves 0.1 nm there
+  const double far = 1e6;  // (m) a double still resolves 0.1 nm there
   const TriangleMesh mesh = box_mesh({far, -far, far}, {far + 0.01, -far + 0.02, far + 0.03});
   EXPECT_EQ(count(hybrid::voxelise_mesh(mesh, {1e-3, 2e-3, 3e-3}, 1, 10'000)), 1000U);
   const TriangleMesh sheet = box_mesh({0, 0, 0}, {0.1, 0.1, 1e-4});

@@ -34,7 +34,7 @@ dvec3 random_vector(std::mt19937_64& random, double half) {
   return {x, y, z};
 }
 
-// Dense points of the surface: a box that holds one must be reported.
+// Dense random points of the surface, `a_triangle` per triangle. The map must report a box that contains one.
 std::vector<dvec3> points_on(const polygon::TriangleMesh& mesh, std::mt19937_64& random, int a_triangle) {
   std::uniform_real_distribution<double> u(0.0, 1.0);
   std::vector<dvec3> points;
@@ -60,7 +60,7 @@ struct Body {
   dvec3 velocity{0.0}, spin{0.0};
 
   [[nodiscard]] dvec3 to_scene(const dvec3& p) const { return position + rotation * p; }
-  // Exact for boxes and balls, to the resolution of the points.
+  // Least distance of the body's points from a box (m).
   [[nodiscard]] double distance_to_box(const dvec3& low, const dvec3& high) const {
     double least = 1e300;
     for (const dvec3& p : points) {
@@ -113,7 +113,7 @@ class MovingBodies : public ::testing::TestWithParam<std::tuple<double, std::siz
     for (std::uint32_t b = 0; b < bodies.size(); ++b) {
       Body& body = bodies[b];
       if (round % 50 == 0) {
-        // From rest to 10 m/s and 3,000 rad/s, with an occasional jump.
+        // Speeds range from nearly 0 to 10 m/s and 3,000 rad/s, with occasional jumps.
         const double speed = std::pow(10.0, -4.0 + 5.0 * static_cast<double>(random() % 100) / 99.0);
         body.velocity = speed * random_vector(random, 1.0);
         body.spin = 300.0 * speed * random_vector(random, 1.0);
@@ -136,7 +136,7 @@ TEST_P(MovingBodies, AreNeverMissedAndFoundOnlyWhereTheyAre) {
   std::size_t hits = 0, misses = 0;
   for (int round = 0; round < rounds; ++round) {
     move_all(round, 1e-3);
-    // A box about a point of some body, or anywhere.
+    // The box lies near a point of some body, or anywhere.
     const Body& some = bodies[random() % bodies.size()];
     const bool aimed = random() % 2 == 0;
     const dvec3 centre =
@@ -146,7 +146,7 @@ TEST_P(MovingBodies, AreNeverMissedAndFoundOnlyWhereTheyAre) {
     const dvec3 low = centre - half, high = centre + half;
     const std::uint64_t mask = map.rigid_in(low, high);
     for (std::uint32_t b = 0; b < bodies.size(); ++b) {
-      // Most bodies are far away by their bounds.
+      // Most bodies are far away, and must not be reported.
       if (glm::distance(bodies[b].position, centre) > 0.06 + glm::length(half)) {
         ASSERT_EQ(mask & OccupancyMap::rigid_bit(b), 0U) << "body " << b << " is far away";
         continue;
@@ -157,7 +157,8 @@ TEST_P(MovingBodies, AreNeverMissedAndFoundOnlyWhereTheyAre) {
         ASSERT_TRUE(said) << "body " << b << " was missed in round " << round;
         ++hits;
       }
-      // The box's corners, rotated into the body's frame, reach √3 further at most, plus one cell.
+      // A reported body is near. In the body's frame the box is replaced by its bounds, which reach further
+      // by at most (√3 − 1) of its half diagonal. Cells add to this.
       if (said) {
         ASSERT_LE(distance, 0.74 * glm::length(half) + 2.0 * kCell + 2e-3) << "body " << b << " is elsewhere";
       } else {
@@ -201,7 +202,8 @@ TEST_P(MovingBodies, TakeNoMoreMemoryForHavingMoved) {
 INSTANTIATE_TEST_SUITE_P(FewAndMany, MovingBodies,
                          ::testing::Combine(::testing::Values(0.0, 1e6), ::testing::Values(1U, 4U, 40U)));
 
-// Beside fixed surfaces and soft voxels: each query is answered by its own layers only.
+// Moving bodies share a map with fixed surfaces and soft voxels. Each query reports only its own kinds of
+// object.
 TEST(MovingSurfaceLayer, ShareTheMapWithWhatStays) {
   OccupancyMap map(kCell, dvec3(0.0));
   map.add_triangle(0, dvec3(0.0), dvec3(0.01, 0, 0), dvec3(0, 0.01, 0));
@@ -232,11 +234,11 @@ TEST(MovingSurfaceLayer, OnlyDistrictsThatABodyLeavesOrEntersChange) {
                    dquat(1, 0, 0, 0));
   map.reserve_bricks(0);
   ASSERT_EQ(map.district_changes(), 0U);
-  // Rotation in place and motion within the district change nothing.
+  // Rotation in place does not change districts.
   for (int n = 0; n < 1000; ++n) map.move_body(3, {0.9, 0.0, 0.0}, glm::angleAxis(0.01 * n, dvec3(0, 0, 1)));
   EXPECT_EQ(map.district_changes(), 0U);
-  // A body's length in 10,000 steps crosses one border along x with its front and one with its back: at most
-  // four districts each.
+  // The body moves by its own length in 10,000 steps. Its front and its back each cross at most one border
+  // along x, with at most four districts each.
   for (int n = 0; n <= 10'000; ++n)
     map.move_body(3, {0.9 + 2.0 * radius * n / 10'000.0, 0.0, 0.0}, dquat(1, 0, 0, 0));
   EXPECT_LE(map.district_changes(), 16U);
@@ -244,7 +246,8 @@ TEST(MovingSurfaceLayer, OnlyDistrictsThatABodyLeavesOrEntersChange) {
   EXPECT_TRUE(map.validate());
 }
 
-// The margin of a curved surface: points of the exact ball, outside its inscribed triangles, must be found.
+// Points of the exact ball lie outside its inscribed triangles. With the margin of a curved surface, they
+// must be found.
 TEST(SurfaceCells, AMarginCoversWhatTheTrianglesStandFor) {
   std::mt19937_64 random(3);
   const double radius = 0.05;
@@ -266,7 +269,7 @@ TEST(SurfaceCells, AMarginCoversWhatTheTrianglesStandFor) {
   }
 }
 
-// Sealing changes no answer, in any part of the bitmap.
+// seal() changes no answer in any part of the bitmap.
 TEST(SurfaceCells, SealingChangesNoAnswer) {
   std::mt19937_64 random(5);
   for (const double extent : {0.02, 0.5, 30.0}) {

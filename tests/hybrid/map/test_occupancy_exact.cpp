@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After any number of motions the map equals the map that would be built from the present positions. Voxels
-// that wander far and long need no more memory.
+// After any number of motions, the map equals a map that is built from the present positions. Voxels that
+// move far and for a long time need no more memory.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ std::vector<std::uint32_t> soft_in(const OccupancyMap& map, const dvec3& low, co
                                    std::size_t most) {
   std::vector<std::uint32_t> out(most + 1);
   out.resize(map.soft_in(low, high, out));
-  std::sort(out.begin(), out.end());  // lists are in the order of motion
+  std::sort(out.begin(), out.end());  // because the map's lists are in the order of motion
   return out;
 }
 
@@ -81,7 +81,7 @@ TEST_P(OccupancyExact, IsTheMapBuiltFromScratchAfterAHundredThousandMotions) {
   const std::size_t bytes = map.memory_bytes();
   std::size_t crowded = 0;
   for (int n = 1; n <= 100'000; ++n) {
-    if (n % 10 == 0) {  // a body: a step or a jump
+    if (n % 10 == 0) {  // moves a body by a step or a jump
       const std::size_t b = random() % scene.bodies.size();
       scene.position[b] = n % 500 == 0 ? origin + random_vector(random, 0.2)
                                        : scene.position[b] + random_vector(random, 2e-3);
@@ -113,7 +113,7 @@ TEST_P(OccupancyExact, IsTheMapBuiltFromScratchAfterAHundredThousandMotions) {
     const OccupancyMap fresh = scene.built();
     ASSERT_EQ(map.soft_bricks(), fresh.soft_bricks());
     ASSERT_EQ(map.occupied_cells(), fresh.occupied_cells());
-    // Every occupied cell belongs to some voxel.
+    // Queries at every voxel reach every occupied cell.
     for (std::uint32_t v = 0; v < scene.voxels.size(); ++v) {
       const dvec3& at = scene.voxels[v];
       const auto here = soft_in(map, at, at, scene.voxels.size());
@@ -138,7 +138,8 @@ TEST_P(OccupancyExact, IsTheMapBuiltFromScratchAfterAHundredThousandMotions) {
 
 INSTANTIATE_TEST_SUITE_P(AtAndFarFromTheOrigin, OccupancyExact, ::testing::Values(0.0, 1e4));
 
-// A few voxels in a region of a million bricks, with capacity for only twenty more bricks than are in use.
+// 200 voxels wander in a region of a million bricks. The map has capacity for only 200 more bricks than at
+// the start.
 TEST(OccupancyRoom, VoxelsThatWanderForEverGiveTheirBricksBack) {
   std::mt19937_64 random(8);
   OccupancyMap map(kCell, dvec3(0.0));
@@ -167,7 +168,7 @@ TEST(OccupancyRoom, VoxelsThatWanderForEverGiveTheirBricksBack) {
   }
 }
 
-// Without spare capacity, a voxel that is alone in its brick takes the brick along.
+// The map has no spare brick. A voxel that is alone in its brick can still move, because its brick is reused.
 TEST(OccupancyRoom, AVoxelThatIsAloneNeedsNoRoomToSpare) {
   OccupancyMap map(kCell, dvec3(0.0));
   map.add_soft(1);
@@ -179,9 +180,10 @@ TEST(OccupancyRoom, AVoxelThatIsAloneNeedsNoRoomToSpare) {
   EXPECT_FALSE(map.any_near(dvec3(0.0), dvec3(0.0)));
 }
 
-// Bitmap units that voxels have left must be empty again, too.
+// The bitmap's units that a voxel has left must be empty again.
 TEST(OccupancyRoom, NothingIsNearWhereAVoxelHasPassed) {
-  for (const double extent : {0.4, 1.5, 3.0}) {  // units of one brick, of two and of four along an edge
+  for (const double extent :
+       {0.4, 1.5, 3.0}) {  // at these extents, a unit has one, two and four bricks along an edge
     SCOPED_TRACE(extent);
     OccupancyMap map(kCell, dvec3(0.0));
     map.add_soft(3);

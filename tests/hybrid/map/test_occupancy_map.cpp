@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The occupancy map against brute force over its content. A cell is the map's resolution: a query must report
-// everything inside a box, and may report things within one cell of the box.
+// The occupancy map against brute force over its content. Its resolution is a cell: a query must report
+// everything inside a box, and may also report things within one cell of the box.
 #include "hybrid/map/occupancy_map.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,8 @@ bool within(const dvec3& p, const dvec3& low, const dvec3& high) {
   return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
 }
 
-// Triangle-box intersection: the triangle is clipped by the box's six planes (Sutherland & Hodgman 1974).
+// Whether a triangle meets a box. The triangle is clipped by the box's six planes (Sutherland & Hodgman
+// 1974).
 bool meets(const Triangle& t, const dvec3& low, const dvec3& high) {
   std::vector<dvec3> polygon(t.begin(), t.end());
   for (int d = 0; d < 3; ++d) {
@@ -53,16 +54,16 @@ bool meets(const Triangle& t, const dvec3& low, const dvec3& high) {
   return true;
 }
 
-// The same queries in every test, at the scene's origin and far from it.
+// Each test runs at the scene's origin and far from it.
 class Occupancy : public ::testing::TestWithParam<double> {
  protected:
   static constexpr double kCell = 2e-3;
   const dvec3 origin{GetParam(), -GetParam(), 0.5 * GetParam()};
-  // Rounding of coordinates at this distance.
+  // Rounding of coordinates at this distance from the origin.
   const double rounding = 1e-15 + 4e-16 * GetParam();
   std::mt19937_64 random{99};
   OccupancyMap map{kCell, origin};
-  OccupancyMap::Trail trail;  // through all queries
+  OccupancyMap::Trail trail;  // one trail for all queries
 
   void expect_soft(const std::vector<dvec3>& points, const dvec3& low, const dvec3& high) {
     std::vector<std::uint32_t> out(points.size());
@@ -101,7 +102,7 @@ TEST_P(Occupancy, FindsSoftVoxelsAsBruteForceDoesAfterManyMoves) {
   for (int round = 0; round < 60; ++round) {
     for (int n = 0; n < 1000; ++n) {
       const std::size_t i = any(random);
-      // Mostly small steps, as tissue moves; sometimes across the scene.
+      // Most steps are small, like those of tissue. Some lead across the scene.
       points[i] +=
           n % 10 == 0 ? 0.5 * (origin - points[i]) + random_point(random, 0.04) : random_point(random, 1e-3);
       map.move(static_cast<std::uint32_t>(i), points[i]);
@@ -116,7 +117,7 @@ TEST_P(Occupancy, FindsSoftVoxelsAsBruteForceDoesAfterManyMoves) {
   EXPECT_EQ(map.overflows(), 0U);
 }
 
-// More than a block's inline capacity: all 64 cells with two voxels each, and empty again.
+// All 64 cells of a block get two voxels each, more than the block's inline capacity, and become empty again.
 TEST_P(Occupancy, ABlockMayBeFullAndEmptyAgain) {
   const dvec3 far = origin + 100.0 * kCell;
   std::vector<dvec3> cells, points;
@@ -149,7 +150,7 @@ TEST_P(Occupancy, FindsRigidSurfacesAsBruteForceDoes) {
   std::vector<Triangle> triangles;
   for (std::uint32_t n = 0; n < 40; ++n) {
     const dvec3 a = origin + random_point(random, 0.05);
-    // Fat triangles, slivers, segments and points; some flat in the faces between cells.
+    // The triangles are fat triangles, slivers, segments and points. Some lie in the faces between cells.
     Triangle t{a, a + random_point(random, 0.01), a + random_point(random, 0.01)};
     if (n % 5 == 1) t[2] = t[0] + 0.5 * (t[1] - t[0]) + 1e-9;
     if (n % 5 == 2) t[2] = t[1] = t[0];
@@ -189,7 +190,7 @@ TEST_P(Occupancy, NothingIsNearWhereNothingIs) {
   EXPECT_TRUE(map.any_near(origin - 1e-4, origin + 1e-4));
   EXPECT_FALSE(map.any_near(origin + 2.0 * brick, origin + 3.0 * brick));
   EXPECT_FALSE(map.any_near(origin - 3.0 * brick, origin - 2.0 * brick));
-  // Voxels that left are no longer there.
+  // A voxel that has left a place is no longer found there.
   map.reserve_bricks(64);
   map.move(0, origin + dvec3(10.0 * brick));
   std::vector<std::uint32_t> out(4);
@@ -197,8 +198,8 @@ TEST_P(Occupancy, NothingIsNearWhereNothingIs) {
   EXPECT_EQ(map.soft_in(origin + 10.0 * brick - 1e-3, origin + 10.0 * brick + 1e-3, out), 1U);
 }
 
-// Seven voxels need seven bricks, and there are four: a voxel without a brick keeps its last position in the
-// map.
+// Seven voxels need seven bricks, but there are only four. In the map, a voxel without a brick keeps its last
+// position.
 TEST_P(Occupancy, AFullMapKeepsAVoxelWhereItWasLastKnown) {
   map.add_soft(7);
   for (std::uint32_t n = 0; n < 7; ++n) map.place(n, origin);
@@ -208,7 +209,7 @@ TEST_P(Occupancy, AFullMapKeepsAVoxelWhereItWasLastKnown) {
   EXPECT_TRUE(map.validate());
   std::vector<std::uint32_t> out(8);
   EXPECT_EQ(map.soft_in(origin - 1e-3, origin + 1e-3, out), 4U);
-  // One voxel returns, and its brick becomes free for another.
+  // One voxel returns, so its brick becomes free for another voxel.
   map.move(1, origin);
   map.move(6, origin + dvec3(0.6, 0, 0));
   EXPECT_EQ(map.overflows(), 3U);
@@ -247,8 +248,8 @@ TEST(OccupancyMap, ManyObjectsShareTheLastBit) {
   }
 }
 
-// The rule is equal along each axis, on both sides of a cell's face, of zero, and of positions without a
-// cell.
+// The rule is equal along each axis, for values on both sides of a cell's face and of zero, and for values
+// without a cell.
 TEST(OccupancyMap, ACellBeginsAtItsLowerFace) {
   const hybrid::BrickGrid grid(0.5, dvec3(0.0));
   const double far = 1e300, none = std::numeric_limits<double>::quiet_NaN();
@@ -271,8 +272,8 @@ TEST(OccupancyMap, ACellBeginsAtItsLowerFace) {
   }
 }
 
-// A path forward and back through blocks that exist, that do not exist, and that appear and vanish meanwhile.
-// With a trail, and with a trail that was used in another map, the answers must equal those without a trail.
+// A path leads forward and back through blocks that exist, do not exist, or appear and vanish meanwhile.
+// Queries with a trail must give the same answers as without, even if the trail was used in another map.
 TEST(OccupancyMap, APathFindsWhatIsThereNow) {
   constexpr double kCell = 1e-3;
   constexpr std::uint32_t kCount = 20'000;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Report pages: no text gets out of its place, nothing is loaded from elsewhere, and the tables that are seen
-// hold the data that are embedded.
+// Report pages: texts are escaped, nothing is loaded from elsewhere, and the visible tables show the embedded
+// data.
 #include "hybrid/page/page.h"
 
 #include <gtest/gtest.h>
@@ -91,7 +91,7 @@ TEST(Page, LoadsNothingFromElsewhere) {
   for (const char* loads :
        {"@import", "<link", "<iframe", "<object", "<embed", "fetch(", "XMLHttpRequest", "import(", "<base"})
     EXPECT_EQ(tests::count(html, loads), 0U) << loads;
-  // The name space of SVG is a name and loads nothing.
+  // The address of SVG's name space is only a name and loads nothing.
   const std::string without = std::regex_replace(html, std::regex("http://www.w3.org/2000/svg"), "");
   EXPECT_EQ(tests::count(without, "http"), 0U);
   for (const std::string& place : matches(html, "url\\(([^)]*)\\)"))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A folder for figures, and what is asked of their text.
+// A temporary folder for figures, and checks of their text.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 
 namespace tests {
 
-class Folder {  // removed with its content
+class Folder {  // removed with its content at the end
  public:
   Folder() {
     const auto* test = testing::UnitTest::GetInstance()->current_test_info();
@@ -50,8 +50,8 @@ inline std::size_t count(const std::string& text, const std::string& what) {
   return n;
 }
 
-// Tags open and close in order, attributes are quoted, entities are known: enough XML to catch the errors of
-// a hand-written writer.
+// Expects that tags open and close in order, attributes are quoted, and entities are known. This is enough to
+// catch errors of a hand-written XML writer.
 inline void expect_well_formed(const std::string& xml) {
   std::vector<std::string> open;
   std::size_t i = 0;

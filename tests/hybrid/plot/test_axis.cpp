@@ -63,7 +63,7 @@ TEST(QuantityText, HasAPrefixAndNoExponent) {
 TEST(AxisTest, ShowsOneBesideAHundredOnASymmetricScale) {
   const Axis axis(Scale::symmetric, {-100.0, 100.0}, 0.0, 600.0);
   EXPECT_NEAR(axis.page(0.0), 300.0, 1e-9);
-  // 0 to 1, 1 to 10 and 10 to 100 are equally long.
+  // The intervals 0 to 1, 1 to 10 and 10 to 100 are equally long.
   for (const double side : {-1.0, 1.0}) {
     EXPECT_NEAR(axis.page(side), 300.0 + side * 100.0, 1e-9);
     EXPECT_NEAR(axis.page(side * 10.0), 300.0 + side * 200.0, 1e-9);
@@ -81,13 +81,13 @@ TEST(AxisTest, HasPowersOfTenOnALogarithmicScale) {
   EXPECT_FALSE(std::isfinite(axis.page(0.0)));
   EXPECT_FALSE(std::isfinite(axis.page(-1.0)));
   EXPECT_EQ(axis.ticks(6).size(), 7U);
-  // A single decade has numbers in between.
+  // An axis of a single decade has ticks in between.
   EXPECT_EQ(Axis(Scale::logarithmic, {1.0, 10.0}, 0.0, 1.0).ticks(5),
             (std::vector<double>{1.0, 2.0, 5.0, 10.0}));
 }
 
 TEST(AxisTest, SqueezesIntervalsAndStaysInOrder) {
-  // 10 s, of which 2 to 5 s and 6 to 10 s are squeezed: 3 s on 140 pixels.
+  // An axis of 10 s. The intervals 2 to 5 s and 6 to 10 s are squeezed, so 3 s share the remaining pixels.
   const Axis axis(Scale::linear, {0.0, 10.0}, 100.0, 300.0, {{2.0, 5.0}, {6.0, 10.0}});
   const double per_s = (200.0 - 2.0 * Axis::kSqueezed_px) / 3.0;
   EXPECT_NEAR(axis.page(0.0), 100.0, 1e-9);

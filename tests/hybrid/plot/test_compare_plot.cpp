@@ -18,7 +18,8 @@ using tests::expect_well_formed;
 using tests::Folder;
 using tests::row;
 
-// A press from 1 to 2 s in 5 s: 2 N by the reference, `share` of it by each other model.
+// Rows of 5 s with a press from 1 to 2 s. The reference feels 2 N, and each other model the given multiple of
+// it.
 std::vector<hybrid::ComparedModel> pressed(const std::vector<std::pair<std::string, double>>& others) {
   std::vector<hybrid::ComparedModel> models(1);
   models[0].name = "voxels";
@@ -48,7 +49,7 @@ TEST(ComparePlot, NamesEveryModelAndStaysSmall) {
   for (std::size_t m = 0; m < models.size(); ++m) {
     models[m].name = "model " + std::to_string(m);
     for (int i = 0; i < 50'000; ++i) {
-      // Each model has its own rate.
+      // Each model has another rate.
       hybrid::TraceRow r = row(i * 1e-3 * (1.0 + 0.1 * static_cast<double>(m)),
                                1.0 + std::sin(i * 0.7 + static_cast<double>(m)), 1);
       r.device_m.z = -5e-3 * std::sin(i * 1e-2);
@@ -78,7 +79,8 @@ TEST(ComparePlot, GivesEachModelPanelsOfItsOwn) {
   EXPECT_EQ(count(svg, ">difference (JND)<"), 2U);
 }
 
-// 30 N in place of 2 N are 200 JND of 0.14 N, and 2.1 N are 0.71: both are read off axes with the same ticks.
+// With a JND of 0.14 N, 30 N instead of 2 N are 200 JND, and 2.1 N are 0.71 JND. Both axes have ticks at 1
+// JND.
 TEST(ComparePlot, ReadsDifferencesInJndByNumbers) {
   const std::string large = drawn(pressed({{"mesh and proxy", 15.0}}));
   for (const char* tick : {">1<", ">10<", ">100<"}) EXPECT_GE(count(large, tick), 1U) << tick;
@@ -91,7 +93,8 @@ TEST(ComparePlot, ReadsDifferencesInJndByNumbers) {
   EXPECT_EQ(count(axis, ">10<"), 0U);
 }
 
-// A model that still pulls for 3 s after the others have let go: over its own time, below the others.
+// A model still pulls for 3 s after the others have released. It is drawn over its own time axis, below the
+// others.
 TEST(ComparePlot, DrawsApartWhatPullsOn) {
   auto models = pressed({{"mesh and proxy", 1.1}, {"classic", 0.5}});
   models[2].apart = true;

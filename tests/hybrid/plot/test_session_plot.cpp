@@ -39,7 +39,7 @@ TEST(Decimate, KeepsEveryColumnsExtremesAndEnds) {
   EXPECT_EQ(kept.back().x, x.back());
   EXPECT_EQ(std::ranges::max(kept, {}, &PlotPoint::y).y, std::ranges::max(y));
   EXPECT_EQ(std::ranges::min(kept, {}, &PlotPoint::y).y, std::ranges::min(y));
-  // Against brute force, column by column.
+  // Compares the extremes of each tested column with brute force.
   for (std::size_t column = 0; column < 500; column += 7) {
     double low = 1e9;
     double high = -1e9;
@@ -76,7 +76,7 @@ TEST(Decimate, TurnsARunOfNonFiniteValuesIntoOneGap) {
   const std::vector<double> x{0.0, 1.0, 2.0, 3.0, 4.0, 5.0};
   const std::vector<double> y{nan, 1.0, nan, std::numeric_limits<double>::infinity(), 2.0, nan};
   const auto kept = hybrid::downsample_columns(x, y, 0.0, 5.0, 100);
-  ASSERT_EQ(kept.size(), 4U);  // 1, gap, 2, gap
+  ASSERT_EQ(kept.size(), 4U);  // the values 1, gap, 2, gap
   EXPECT_EQ(kept[0].y, 1.0);
   EXPECT_TRUE(std::isnan(kept[1].y));
   EXPECT_EQ(kept[2].y, 2.0);
@@ -152,7 +152,8 @@ TEST(SessionPlot, DrawsEmptyAndNonFiniteTraces) {
   EXPECT_NE(svg.find("without a finite force"), std::string::npos);
 }
 
-// Three contacts: with bone and tissue at 1 s, with tissue at 5 s, with the 40th object at 9 s; 10 s in all.
+// A session of 10 s with three contacts: with bone and tissue at 1 s, with tissue at 5 s, and with the 40th
+// object at 9 s.
 struct ThreeContacts {
   std::vector<hybrid::TraceRow> rows;
   std::vector<hybrid::PlottedObject> objects{{"bone", false, {}}, {"rib", false, {}}, {"tissue", true, {}}};
@@ -230,7 +231,7 @@ TEST(SessionPlot, DrawsOneLineOverDepthForEachContact) {
 TEST(SessionPlot, SqueezesTheAirAndSaysSo) {
   ThreeContacts session;
   const std::string svg = session.svg();
-  // From 1.5 to 5 s and from 5.5 to 9 s, less 0.3 s on each side.
+  // The times from 1.5 to 5 s and from 5.5 to 9 s are squeezed, less 0.3 s on each side.
   EXPECT_EQ(count(svg, ">+2.9<"), 2U);
   EXPECT_EQ(count(svg, "long times in the air"), 1U);
   for (auto& r : session.rows) r.contacts = 4U;

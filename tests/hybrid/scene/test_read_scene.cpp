@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene file's values reach the Scene in SI. The refusals are in test_scene_refusals.cpp.
+// The values of a scene file get into the Scene in SI units. test_scene_refusals.cpp tests the refusals.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -69,7 +69,7 @@ TEST_F(SceneFile, EveryUnitBecomesMeters) {
     EXPECT_DOUBLE_EQ(scene.unit_m, meters);
     EXPECT_DOUBLE_EQ(scene.occupancy_cell_m.value_or(0.0), 3.0 * meters);
     EXPECT_DOUBLE_EQ(scene.tool.radius_m, 2.0 * meters);
-    EXPECT_EQ(scene.tool.stiffness_N_per_m, 700.0);  // N/m with any unit of length
+    EXPECT_EQ(scene.tool.stiffness_N_per_m, 700.0);  // in N/m, whatever the unit of length
     EXPECT_DOUBLE_EQ(std::get<hybrid::BallPrimitive>(scene.rigid.at(0).source).radius_m, 4.0 * meters);
     expect_near(scene.rigid.at(0).pose.position_m, glm::dvec3(1.0, 2.0, 3.0) * meters);
     const auto& formula = std::get<voxel::Formula>(scene.soft.at(0).source);
@@ -136,7 +136,7 @@ TEST_F(SceneFile, DelayWatchdogGripTremorAndSafetyAreRead) {
   EXPECT_FALSE(usual.watchdog_s.has_value());
 }
 
-// Extrinsic, x then y then z: equal to three rotation matrices applied one after the other.
+// The rotation is extrinsic about x, then y, then z. It equals three rotation matrices applied in this order.
 TEST_F(SceneFile, RotationIsAboutTheFixedAxesXThenYThenZ) {
   const Scene scene = load("format = 1\n" + ball + "rotation = [30, -50, 110]\n" + path);
   const double x = 30.0 * M_PI / 180.0, y = -50.0 * M_PI / 180.0, z = 110.0 * M_PI / 180.0;
@@ -172,7 +172,7 @@ TEST_F(SceneFile, RigidSources) {
   const auto& volume = std::get<hybrid::VolumeSurfaceSource>(scene.rigid[4].source);
   ASSERT_EQ(volume.rules.size(), 2U);
   EXPECT_EQ(volume.rules[1].lower, 1001.0);
-  EXPECT_EQ(volume.rules[1].label, 1);  // a surface only distinguishes inside and outside
+  EXPECT_EQ(volume.rules[1].label, 1);  // a surface needs only inside and outside
   EXPECT_DOUBLE_EQ(volume.spacing_m.value_or(0.0), 2e-3);
   EXPECT_DOUBLE_EQ(volume.grow_m, 1.5e-3);
   EXPECT_EQ(volume.smooth, 0);
@@ -285,22 +285,23 @@ TEST_F(SceneFile, Paths) {
 }
 
 TEST_F(SceneFile, ExtremesThatAreSaidClearlyAreTaken) {
-  EXPECT_NO_THROW((void)load("format = 1\nunits = \"um\"\n" + block + path));  // spacing 2 um
-  EXPECT_NO_THROW((void)load("format = 1\nunits = \"m\"\n" + block + path));   // 2 m
+  EXPECT_NO_THROW((void)load("format = 1\nunits = \"um\"\n" + block + path));  // a spacing of 2 um
+  EXPECT_NO_THROW((void)load("format = 1\nunits = \"m\"\n" + block + path));   // a spacing of 2 m
   EXPECT_NO_THROW(
       (void)load("format = 1\n" + block + "position = [1e9, -1e9, 0]\n" + path));  // 1,000 km away
   EXPECT_NO_THROW((void)load("format = 1\n[tool]\nstiffness = 25000000\n" + block + path));
   EXPECT_NO_THROW(
       (void)load("\xEF\xBB\xBF"
                  "format = 1\n" +
-                 block + path));  // a byte order mark of UTF-8
+                 block + path));  // begins with the byte-order mark of UTF-8
   std::string windows = "format = 1\n" + block + path;
   for (std::size_t at = 0; (at = windows.find('\n', at)) != std::string::npos; at += 2)
     windows.insert(at, "\r");
   EXPECT_NO_THROW((void)load(windows));
 }
 
-// 512 cubed at 4 bytes per voxel: 0.54 GB, which every build machine has.
+// At least 512 cubed voxels must be allowed. At 4 bytes per voxel they need 0.54 GB, which every build
+// machine has.
 TEST_F(SceneFile, TheLimitOfALatticeIsThatOfTheMachine) {
   const std::size_t most = hybrid::max_lattice_voxels();
   EXPECT_GE(most, std::size_t{1} << 27);
@@ -315,7 +316,7 @@ TEST_F(SceneFile, TheLimitOfALatticeIsThatOfTheMachine) {
   EXPECT_NE(refusal(cube(1.01 * edge)).find("bytes"), std::string::npos);
 }
 
-// A plate without slack, on tissue or by itself, is rendered correctly; so there is no warning.
+// A plate without slack is rendered correctly, on tissue or alone. So there is no warning.
 TEST_F(SceneFile, TissueWithoutSlackNeedsNoWarning) {
   const auto warnings = [&](const std::string& stretch, const std::string& shear, double below) {
     std::ostringstream out;
@@ -332,7 +333,7 @@ TEST_F(SceneFile, TissueWithoutSlackNeedsNoWarning) {
   };
   EXPECT_EQ(warnings("[1, 1]", "0", 4.0), "");
   EXPECT_EQ(warnings("[0.95, 1.05]", "0.05", 4.0), "");
-  EXPECT_EQ(warnings("[1, 1]", "0", 0.0), "");  // it stands on its anchors
+  EXPECT_EQ(warnings("[1, 1]", "0", 0.0), "");  // the plate stands on its anchors
 }
 
 TEST(Scenes, AllThatComeWithTheProgramLoad) {

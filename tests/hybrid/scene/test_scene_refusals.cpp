@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every error in a scene file is refused with its place and a remedy. broken_scenes/ has one file for each.
+// Every error in a scene file is refused with its place and a remedy. broken_scenes/ has a file for each
+// error.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,8 +34,8 @@ class SceneRefusal : public tests::SceneFile {};
 struct Broken {
   const char* file;
   const char* place;   // line:column
-  const char* wrong;   // part of the error
-  const char* remedy;  // part of the remedy
+  const char* wrong;   // part of the error's text
+  const char* remedy;  // part of the remedy's text
 };
 // Without this, a case would be listed by the bytes of its pointers, which differ between runs.
 void PrintTo(const Broken& scene, std::ostream* out) {
@@ -260,7 +261,7 @@ TEST(SceneKeys, EditDistanceCountsEditsAndSwaps) {
   EXPECT_EQ(hybrid::edit_distance("", "abc"), 3U);
 }
 
-// A few thousand small damages to a scene with every table: each gives a scene or a refusal, nothing else.
+// A few thousand small damages to a scene with every table. Each must give a scene or a refusal.
 TEST_F(SceneRefusal, DamagedScenesAreScenesOrRefused) {
   const std::string whole =
       "format = 1\nunits = \"mm\"\ntitle = \"T\"\noverlap = \"carve\"\n[occupancy]\ncell = 2.5\n"
@@ -314,7 +315,7 @@ TEST_F(SceneRefusal, DamagedScenesAreScenesOrRefused) {
           if (digit != std::string::npos) text[digit] = static_cast<char>('0' + below(10));
           break;
         }
-        default: {  // a digit is replaced by a character that may be part of a number
+        default: {  // replaces a digit by a character that may be part of a number
           const std::size_t digit = text.find_first_of("0123456789", at);
           if (digit != std::string::npos) text.replace(digit, 1, pieces[below(pieces.size())]);
         }
@@ -347,7 +348,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-// Lines as ":2:1: unknown key …", in the order of the file.
+// The refusal has lines such as ":2:1: unknown key …", in the order of the file.
 TEST_F(SceneRefusal, AllErrorsAreSaidInTheOrderOfTheFile) {
   const std::string said = refusal(
       "format = 1\ntitel = \"a\"\n"                                                  // 2
@@ -403,7 +404,7 @@ TEST_F(SceneRefusal, Latin1IsNamedWithItsLine) {
   EXPECT_NE(said.find("Latin-1"), std::string::npos) << said;
   EXPECT_NE(said.find("'\u00E4'"), std::string::npos) << said;
   EXPECT_NE(said.find("save the file as UTF-8"), std::string::npos) << said;
-  // In a comment too; and what is cut within a character is not Latin-1, but no UTF-8 either.
+  // The same holds in a comment. A text that is cut within a character is neither Latin-1 nor UTF-8.
   EXPECT_NE(refusal("format = 1 # f\xFCr\n").find(":1:15: "), std::string::npos);
   EXPECT_NE(refusal("format = 1 # \xE2\x82\n").find("not utf-8"), std::string::npos);
   EXPECT_EQ(refusal("format = 1\ntitle = \"Sch\u00E4del\"\n" + block + path), "");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The last two seconds are kept to the tick, and are written after a fault: also after a crash of the
-// program.
+// The black box keeps the last two seconds tick by tick. It is written after a fault, and also after a crash
+// of the program.
 #include "hybrid/session/black_box.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ TEST_F(BlackBox, KeepsWhatLedToAFaultAndWhatCameOfIt) {
   constexpr std::uint64_t first = at + kRoom / 4 + 1 - kRoom;
   for (std::size_t n = 0; n < kRoom; ++n) {
     EXPECT_EQ(path.position_m[n].x, static_cast<double>(first + n));
-    EXPECT_NEAR(path.t_s[n], 1e-3 * static_cast<double>(n), 1e-9);  // a path begins at 0
+    EXPECT_NEAR(path.t_s[n], 1e-3 * static_cast<double>(n), 1e-9);  // the times of a path begin at 0
   }
 }
 
@@ -140,12 +140,12 @@ TEST_F(BlackBox, WhatCannotBeWrittenIsSaidBeforeTheSessionOrAfterTheFault) {
   EXPECT_THROW((void)kept_box.save_on_fault(), std::runtime_error);
 }
 
-// Removes other handlers: a sanitizer's own handler would report the crash and end the program.
+// Removes other signal handlers. A sanitizer's handler would report the crash and end the program.
 void die_of_it() {
   for (const int number : {SIGSEGV, SIGABRT}) signal(number, SIG_DFL);
 }
 
-// A child process that crashes.
+// A child process crashes, and its black box is written.
 TEST_F(BlackBox, ACrashWritesIt) {
   EXPECT_EXIT(
       {
@@ -159,8 +159,8 @@ TEST_F(BlackBox, ACrashWritesIt) {
   EXPECT_EQ(kept().position_m.front().x, 50.0);
 }
 
-// Actions run in reverse order of creation (motors first), and a crash within one action does not stop the
-// others.
+// Actions on a crash run in reverse order of their creation, so motors come first. A crash within one action
+// does not stop the others.
 TEST_F(BlackBox, ActsOnACrashGoBackwardsAndOneThatCrashesLeavesTheOthers) {
   EXPECT_EXIT(
       {

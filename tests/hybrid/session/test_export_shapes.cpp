@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files that a session writes for other programs, read back; and the effect of thinning on a scene.
+// The files that a session writes for other programs are read back. Also the effect of thinning on a scene.
 #include "hybrid/session/export_shapes.h"
 
 #include <array>
@@ -23,7 +23,8 @@ class SavedShapes : public tests::SceneFile {
   [[nodiscard]] fs::path in_folder(const std::string& name) const { return folder_ / name; }
 };
 
-// The vectors of an unpacked NIfTI file of this project: three volumes of floats after 352 bytes, in mm.
+// The vectors (m) of an unpacked NIfTI file of this project. It has three volumes of floats in mm after 352
+// bytes.
 std::vector<glm::dvec3> read_vectors(const fs::path& file, std::size_t voxels) {
   std::ifstream in(file, std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
@@ -59,7 +60,7 @@ TEST_F(SavedShapes, AtRestTheFieldIsZeroAndTheLabelsAreTheVolumes) {
   const auto names = hybrid::save_volumes(in_folder("out.nii"), scene, built);
   ASSERT_EQ(names, (std::vector<fs::path>{in_folder("out.nii"), in_folder("out-labels.nii")}));
   for (const glm::dvec3& u : read_vectors(names[0], volume.labels.size())) EXPECT_EQ(u, glm::dvec3(0.0));
-  // On the volume of the object's source, independent of the object's pose in the scene.
+  // Labels are written on the volume of the object's source, independent of the object's pose in the scene.
   const voxel::LabelVolume back = voxel::load_volume(names[1], {});
   EXPECT_EQ(back.dims, volume.dims);
   EXPECT_EQ(back.labels, volume.labels);
@@ -81,13 +82,14 @@ TEST_F(SavedShapes, APressedObjectIsSavedAsItIs) {
     for (std::size_t n = 0; n < field.size(); ++n) {
       const std::array<std::size_t, 3> at{n % 10, n / 10 % 10, n / 100};
       const glm::dvec3 rest = 2e-3 * glm::dvec3(at[0], at[1], at[2]);
-      EXPECT_LT(glm::distance(field[n], object.displacement_at(rest)), 1e-8);  // in the object's own frame
+      EXPECT_LT(glm::distance(field[n], object.displacement_at(rest)),
+                1e-8);  // vectors are in the object's frame
       deepest = std::min(deepest, field[n].z);
     }
     EXPECT_LT(deepest, -2e-3);  // 5 mm deep into voxels of 2 mm
     const voxel::LabelVolume labels = voxel::load_volume(names[1], {});
     EXPECT_EQ(labels.labels[labels.index(0, 0, 0)], 1);
-    // At the tool, in the middle of the top, there is no tissue any more.
+    // At the tool, in the middle of the top, there is no longer any tissue.
     const glm::dvec3 top(0.0, 0.0, 4.5e-3);
     const glm::dvec3 c = glm::round((top - labels.origin_m) / labels.spacing_m);
     const int k = static_cast<int>(c.z);
@@ -136,7 +138,7 @@ TEST_F(SavedShapes, SurfacesHoldEveryObjectWhereItIs) {
     }
   }
   EXPECT_GT(dent, 2e-3);
-  // As STL and OBJ it is in millimeters, as scenes read them.
+  // STL and OBJ files are in millimeters, the unit in which scenes read them.
   for (const char* name : {"after.stl", "AFTER.OBJ"}) {
     hybrid::save_surfaces(in_folder(name), built);
     const polygon::TriangleMesh in_mm = polygon::load_mesh(in_folder(name), {.scale = 1e-3}).mesh;
@@ -157,8 +159,8 @@ TEST_F(SavedShapes, ThinnedObjectsKeepLabelsAnchorsAndMaterials) {
       kBone + "anchors = { labels = [2] }\nthinning = { above = 1e5, every = 4, shell = 1 }\n" + tests::path);
   const hybrid::BuiltScene built = hybrid::build_scene(scene, {});
   const voxel::Lattice& lattice = built.state->soft[0]->lattice();
-  // The shell leaves voxels 6 to 33 of the bone on each axis. Struts are where two coordinates are on the
-  // frame, and in the outermost inner layers where one is.
+  // Inside the shell, the bone has voxels 6 to 33 on each axis. Struts remain where two coordinates are on
+  // the frame. In the outermost layers of the inside, one other coordinate on the frame is enough.
   const std::size_t inside = 28;
   std::size_t frame = 0;
   for (int k = 6; k <= 33; ++k) {

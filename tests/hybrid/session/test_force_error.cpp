@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The force error of a session, against a slow run of its own.
+// The force error of a session, against a slow run of the same scene.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ hybrid::SessionOptions options(int samples, std::optional<double> seconds = {}) 
   return options;
 }
 
-// A block beside a rigid ball, pressed and held, at `speed` mm/s.
+// A scene with a block beside a rigid ball. The tool presses at `speed` mm/s and holds.
 std::string beside_a_ball(double speed) {
   return "format = 1\n[material.gel]\nyoung = 10000\npoisson = 0.3\n"
          "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [60, 60, 40]\nspacing = 2\nmaterial = "
@@ -34,8 +34,8 @@ std::string beside_a_ball(double speed) {
          "\npoints = [[0, 0, 32], [0, 0, 22, 0.4], [12, 0, 22, 0.4]]\n";
 }
 
-// The same path ten times slower stands in for the equilibrium, as it needs no reference solver. The two
-// forces are compared where the device has come equally far along its path.
+// Largest difference in JND from the same path run ten times slower. The slow run stands for the equilibrium,
+// so no reference solver is needed. The forces are compared at equal positions along the path.
 double slow_run_jnd(const std::vector<hybrid::TraceRow>& fast, const std::vector<hybrid::TraceRow>& slow,
                     double floor_N) {
   const auto lengths = [](const std::vector<hybrid::TraceRow>& rows) {
@@ -49,7 +49,7 @@ double slow_run_jnd(const std::vector<hybrid::TraceRow>& fast, const std::vector
   for (std::size_t n = 0; n < fast.size(); ++n) {
     if (!(fast[n].soft_N > 1e-6)) continue;
     const double s = of_fast[n] * of_slow.back() / of_fast.back();
-    // Of a stop, the last tick: there the slow run is at rest.
+    // At a stop the last tick counts, in which the slow run is at rest.
     const auto at = std::upper_bound(of_slow.begin(), of_slow.end(), s + 1e-9) - of_slow.begin() - 1;
     const auto reference = slow[static_cast<std::size_t>(at)].force_N;
     worst = std::max(worst, hybrid::jnd_of(fast[n].force_N, reference, floor_N));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The forces between objects balance at rest: hand, rigid objects, other tissue and anchors sum up to nothing
-// on each soft object. They push and do not pull, and to compute them changes nothing.
+// The forces between objects balance at rest. On each soft object, the forces of the hand, rigid objects,
+// other tissue and anchors sum to zero. Computing them does not change the state.
 #include "hybrid/session/forces_between.h"
 
 #include <algorithm>
@@ -56,7 +56,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, ForcesBetweenAtRest,
                            return name + "_" + std::to_string(held.index);
                          });
 
-// A body that lies on tissue presses on it with its weight, and so does the tissue on its anchors.
+// A body that lies on tissue presses on it with its weight. The tissue presses on its anchors with the same
+// force.
 TEST(ForcesBetween, OfABodyAtRestAreItsWeight) {
   const hybrid::Scene scene =
       hybrid::load_scene(std::string(HYBRID_SOURCE_DIR) + "/scenes/dropped-weight.toml");
@@ -75,7 +76,8 @@ TEST(ForcesBetween, OfABodyAtRestAreItsWeight) {
   }
 }
 
-// Links at their limits may hide a force. It is given as unknown then; if all are given, they balance.
+// Links at their limits may hide a force, which is then reported as unknown. If all forces are known, they
+// must balance.
 void expect_unknown_or_balanced(tests::Touch& touch) {
   const hybrid::ForcesBetween forces = hybrid::forces_between(touch.world(), touch.state());
   ASSERT_FALSE(forces.pairs.empty());
@@ -91,7 +93,8 @@ void expect_unknown_or_balanced(tests::Touch& touch) {
 
 class ForcesBetweenAtLimits : public tests::SceneFile {};
 
-// A thin block pressed past what its links allow. Springs alone would show less than the anchors carry.
+// A thin block is pressed deeper than its links allow. The springs alone would show less force than the
+// anchors carry.
 TEST_F(ForcesBetweenAtLimits, AreUnknownOrBalanced) {
   const hybrid::Scene scene = load(
       "format = 1\n[material.gel]\nyoung = 5000\npoisson = 0.3\nstretch = [0.7, 1.3]\nshear = 0.3\n"
@@ -104,7 +107,7 @@ TEST_F(ForcesBetweenAtLimits, AreUnknownOrBalanced) {
   expect_unknown_or_balanced(touch);
 }
 
-// Tissue squeezed between tool and bone.
+// Tissue is squeezed between tool and bone.
 TEST(ForcesBetween, ThatLimitsHideAreUnknown) {
   const hybrid::Scene scene =
       hybrid::load_scene(std::string(HYBRID_SOURCE_DIR) + "/scenes/tissue-on-bone.toml");

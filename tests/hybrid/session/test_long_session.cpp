@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A tool moves as wildly as a hand can, for HYBRID_LONG_TICKS ticks, while another thread relaxes the tissue.
-// Everything stays finite, the map stays exact, memory stays constant, and the same session on one thread is
+// Everything must stay finite, the map exact and the memory constant. The same session on one thread must be
 // equal bit by bit.
 #include <gtest/gtest.h>
 
@@ -25,14 +25,15 @@ namespace {
 using glm::dvec3;
 
 constexpr double kDt_s = 1e-3;
-constexpr std::size_t kStretches = 10;  // a full check follows each stretch
+constexpr std::size_t kStretches = 10;  // a check follows each stretch of ticks
 
 std::size_t long_ticks() {
   const char* ticks = std::getenv("HYBRID_LONG_TICKS");
   return ticks != nullptr ? std::strtoull(ticks, nullptr, 10) : 20'000;
 }
 
-// Moves between random places at 0.02 to 2 m/s, with a rest at every fourth and a jump at every fiftieth.
+// A hand that moves between random places at 0.02 to 2 m/s. Every fourth leg is a rest, and every fiftieth
+// begins with a jump.
 class WildHand {
  public:
   explicit WildHand(std::uint64_t seed) : random_(seed) {}
@@ -77,7 +78,7 @@ std::size_t resident_bytes() {
   return 0;
 }
 
-// Compares the map with one that is built from the present positions.
+// Expects that the map equals one that is built from the present positions.
 void expect_exact(const hybrid::World& world, const hybrid::WorldState& state) {
   ASSERT_TRUE(state.map.validate());
   hybrid::OccupancyMap fresh(state.map.cell_m(), state.map.origin());
@@ -105,12 +106,13 @@ void expect_exact(const hybrid::World& world, const hybrid::WorldState& state) {
 }
 
 struct LongSession {
-  std::vector<std::uint64_t> hash;  // after each stretch
+  std::vector<std::uint64_t> hash;  // [stretch] hash after it
   std::size_t contact_ticks = 0, bytes = 0, bytes_after_first = 0;
   std::uint64_t results = 0;
 };
 
-// The ticks in which results arrived, passed from the live session to the replay that runs beside it.
+// The ticks in which relaxation results arrived. The live session passes them to the replay that runs at the
+// same time.
 struct Arrivals {
   explicit Arrivals(std::size_t ticks) : arrived(ticks, 1) {}
 
@@ -118,7 +120,7 @@ struct Arrivals {
     arrived[tick] = static_cast<std::uint8_t>(bits);
     said.store(tick + 1, std::memory_order_release);
   }
-  // Returns false at the end.
+  // Waits for the entry of a tick. Returns false if the live session ended before.
   bool wait_for(std::size_t tick, std::uint64_t& bits) const {
     while (said.load(std::memory_order_acquire) <= tick) {
       if (ended.load(std::memory_order_acquire) && said.load(std::memory_order_acquire) <= tick) return false;
@@ -128,7 +130,7 @@ struct Arrivals {
     return true;
   }
 
-  std::vector<std::uint8_t> arrived;  // per tick; allocated at the start
+  std::vector<std::uint8_t> arrived;  // [tick] bits of the arrived results; allocated at the start
   std::atomic<std::size_t> said{0};
   std::atomic<bool> ended{false};
 };
@@ -165,7 +167,7 @@ LongSession feel(std::size_t ticks, Relaxed relaxed, Arrivals& arrivals) {
   EXPECT_EQ(state.nonfinite, 0U);
   EXPECT_EQ(state.faults, 0U);
   result.results = state.async.results;
-  // Without contact, until the map's time slices have gone once round.
+  // Ticks without contact, until the map's time slices have covered all voxels once.
   for (int n = 0; n < 3000; ++n) {
     if (plays) state.async.arrived = 0;
     touch.at({0, 0, 0.2});
@@ -174,7 +176,8 @@ LongSession feel(std::size_t ticks, Relaxed relaxed, Arrivals& arrivals) {
   return result;
 }
 
-// Both run at once; the single-thread session is some ticks behind. The memory is that of both.
+// Both sessions run at once, and the single-threaded one is some ticks behind. The measured memory is that of
+// both.
 TEST(LongSession, IsFiniteExactFlatAndTheSameOnOneThread) {
   const std::size_t ticks = long_ticks();
   Arrivals arrivals(ticks);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene costs only what it contains: rigid objects allocate nothing in the voxel code, soft objects nothing
-// in the polygon code. This program attributes every allocation of building and touching a scene to the parts
-// on its stack.
+// A scene allocates memory only for the objects that it contains. Rigid objects allocate nothing in the voxel
+// code, and soft objects nothing in the polygon code. This program attributes each allocation during the
+// build and touch of a scene to the parts on the call stack.
 #include <dlfcn.h>
 #include <execinfo.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define COUNTS_MALLOC 0  // sanitizers have their own
+#define COUNTS_MALLOC 0  // sanitizers have their own malloc
 #else
 #define COUNTS_MALLOC 1
 #endif
@@ -34,7 +34,7 @@ struct Bytes {
 thread_local bool watched = false;
 thread_local Bytes counted;
 
-// The part that a return address belongs to.
+// The parts to which a return address belongs.
 unsigned part_of(void* address) {
   static std::unordered_map<void*, unsigned> known;
   const auto [at, fresh] = known.try_emplace(address, 0U);
@@ -43,8 +43,8 @@ unsigned part_of(void* address) {
   if (dladdr(address, &info) == 0) return 0;
   const std::string_view file = info.dli_fname != nullptr ? info.dli_fname : "";
   const std::string_view name = info.dli_sname != nullptr ? info.dli_sname : "";
-  // Mangled: _ZN5voxel…, _ZNK5voxel…; a template of the standard library with such an argument counts as
-  // well.
+  // Mangled names contain _ZN5voxel… or _ZNK5voxel…. Templates of the standard library with such an argument
+  // count as well.
   if (name.find("5voxel") != std::string_view::npos) at->second |= part_voxel;
   if (name.find("7polygon") != std::string_view::npos) at->second |= part_polygon;
   if (file.find("embree") != std::string_view::npos) at->second |= part_embree;
@@ -53,7 +53,7 @@ unsigned part_of(void* address) {
 
 [[maybe_unused]] void count(std::size_t bytes) noexcept {
   if (!watched) return;
-  watched = false;  // the work here is not counted
+  watched = false;  // allocations of this function are not counted
   std::array<void*, 64> stack{};
   const int depth = backtrace(stack.data(), static_cast<int>(stack.size()));
   unsigned parts = 0;
@@ -68,7 +68,7 @@ unsigned part_of(void* address) {
 }  // namespace
 
 #if COUNTS_MALLOC
-// The GNU C library's own names of the functions that these replace.
+// The GNU C library's names of the functions that are replaced here.
 // NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
 extern "C" {
 void* __libc_malloc(std::size_t size);
@@ -148,7 +148,7 @@ class OnlyRequired : public tests::SceneFile {
     if (COUNTS_MALLOC == 0) GTEST_SKIP() << "skipped: a sanitizer brings its own malloc";
     tests::SceneFile::SetUp();
     std::array<void*, 4> stack{};
-    backtrace(stack.data(), 4);  // its first call allocates
+    backtrace(stack.data(), 4);  // the first call of backtrace() allocates, so it is made here
   }
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scenes whose soft object keeps its contact on nested patches: which scenes do so, and the surface that
-// graphics get.
+// Scenes whose soft object solves its contact on nested patches: the conditions for this, the felt force, and
+// the surface for graphics.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 
 namespace {
 
-// A block of 64 voxels an edge, its top at z = 32 mm.
+// A scene with a block of 64 mm per edge. Its top is at z = 32 mm.
 std::string block(const std::string& more) {
   return "format = 1\n[material.gel]\nyoung = 10000\npoisson = 0.3\nstretch = [0.9, 1.1]\nshear = 0.1\n"
          "[material.stiff]\nyoung = 50000\npoisson = 0.3\n"
@@ -30,7 +30,7 @@ std::string block(const std::string& more) {
 
 class GridSession : public tests::SceneFile {
  protected:
-  // The build's note on where contacts are kept.
+  // The build's note on whether contacts are solved on nested patches.
   std::string note_of(const std::string& text) {
     const hybrid::BuiltScene built = hybrid::build_scene(load(text));
     for (const hybrid::BuildNote& note : built.notes) {
@@ -56,8 +56,8 @@ TEST_F(GridSession, SaysWhereContactsAreKeptAndWhy) {
   EXPECT_NE(note_of(block(other)).find("\"other\" is nearer than 16.2 mm"), std::string::npos);
 }
 
-// Rigid surfaces out of reach do not change what is felt, while the tool moves and after. The proxy may go
-// its way in other steps.
+// Rigid surfaces out of reach do not change the felt force, during and after motion. The proxy's steps may
+// differ a little.
 TEST_F(GridSession, ABallFarAwayChangesNothing) {
   const std::string ball =
       "[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 20\nposition = [150, 0, 20]\n";
@@ -76,8 +76,8 @@ TEST_F(GridSession, ABallFarAwayChangesNothing) {
     ASSERT_LT(hybrid::jnd_of(beside[n], alone[n], hybrid::kJndFloor_N), 0.1) << "tick " << n;
 }
 
-// The window gets the nodes of the patches; the surface computed from them must be where the object itself
-// has it.
+// The window gets the nodes of the patches. The surface computed from them must equal the object's own
+// surface.
 TEST_F(GridSession, TheWindowShowsTheDent) {
   const hybrid::Scene scene = load(block("spacing = 1\nposition = [5, 3, -2]\nrotation = [0, 0, 30]\n"));
   const double top = 0.032 - 0.002 + 0.008;
@@ -106,9 +106,9 @@ TEST_F(GridSession, TheWindowShowsTheDent) {
   for (const glm::vec3& moved : shown()) ASSERT_EQ(moved, glm::vec3(0.0F));
 }
 
-// A chain that is tight nearly from side to side must feel as at rest, both in objects that fit into one box
-// and in larger ones; the local relaxation of single links stalls here. The links hold a ball between voxels
-// still: nothing moves from tick to tick.
+// If the chain is tight over nearly the whole object, the force must be that at rest. Relaxation of single
+// links stalls in this case. Objects that fit into one patch and larger ones are tested. Then the tool is
+// held still, and the force must stay the same from tick to tick.
 TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   for (const int edge : {24, 38, 58}) {
     std::string text = block("spacing = 1\n");
@@ -131,7 +131,7 @@ TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   }
 }
 
-// Four millimetres of skin on fat on muscle, 64 mm an edge, with the given stiffnesses (Pa).
+// A scene with a block of 64 mm per edge: 4 mm of skin on fat on muscle, with the given Young's moduli (Pa).
 std::string layers(const std::array<int, 3>& young, const char* play) {
   std::string text;
   for (const auto& [name, young_Pa] : {std::pair{"skin", young[0]}, {"fat", young[1]}, {"muscle", young[2]}})
@@ -145,8 +145,8 @@ std::string layers(const std::array<int, 3>& young, const char* play) {
   return text;
 }
 
-// Skin, fat and muscle with a tight chain. The fat is squeezed to its limits between the others. It must feel
-// as at rest, also while the tool moves.
+// Skin, fat and muscle with a tight chain. The fat between the others is squeezed to its limits. The force
+// must be that at rest, also while the tool moves.
 TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   constexpr std::array alike{20000, 5000, 10000}, real{100000, 3250, 11100};  // (Pa)
   for (const auto& [young, play] : {std::pair{alike, "[0.9, 1.1]\nshear = 0.1"},
@@ -172,8 +172,8 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   }
 }
 
-// A ball of nine spacings, pressed five spacings deep with no limit active, at 0.1 m/s: the force must be
-// that at rest.
+// A ball with a radius of nine spacings is pressed five spacings deep at 0.1 m/s, with no active limit. The
+// force must be that at rest.
 TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   std::string text = block("spacing = 1\n");
   const auto put = [&](const std::string& what, const std::string& with) {
@@ -187,23 +187,23 @@ TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   const double felt_N = touch.go({0.0, 0.0, top - 5e-3}, 1e-4, 0).force_N.z;
   const auto at_rest = hybrid::equilibrium_force(touch.world(), touch.state());
   ASSERT_TRUE(at_rest);
-  EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // share of the just noticeable difference
+  EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // 0.35 of the least just noticeable difference
 }
 
-// A ball of two and a half spacings, four spacings deep. With wide limits and at the limits it must feel like
-// the same links relaxed one by one, and it must not oscillate.
+// A ball with a radius of 2.5 spacings, up to four spacings deep. With wide and with active limits, its force
+// must be that of the same links relaxed one by one. It must not oscillate.
 TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
-  // Beside a body that may move an object is kept link by link.
+  // Near a body that may move, an object is relaxed link by link.
   const std::string body =
       "[[rigid]]\nname = \"body\"\nprimitive = \"box\"\nsize = [10, 10, 10]\nposition = [500, 0, 0]\nmotion "
       "= "
       "\"path\"\n[rigid.path]\nkind = \"press\"\nfrom = [0, 0, 0]\nto = [0, 0, 0.001]\n";
   struct Row {
     const char* limits;
-    double tolerance, still;  // shares of the force
+    double tolerance, still;  // relative to the force
   };
-  // At limits the force of the links on a voxel is not known, and the voxel swings sideways by a fiftieth of
-  // a spacing.
+  // At limits, the links' force on a voxel is not known. So the voxel swings sideways by a fiftieth of a
+  // spacing.
   for (const auto& [limits, tolerance, still] :
        {Row{"[0.01, 2.5]\nshear = 2", 0.01, 1e-3}, Row{"[0.5, 1.5]\nshear = 0.5", 0.025, 0.01}}) {
     std::string text = block("spacing = 2\n");
@@ -236,8 +236,8 @@ TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
   }
 }
 
-// Distant tissue must follow at once, inwards and outwards. One tick after a step of a tenth of a spacing,
-// which changes the force by an eighth, the force must be that at rest.
+// Distant tissue must follow at once, inwards and outwards. A step of a tenth of a spacing changes the force
+// by an eighth. One tick later the force must be that at rest.
 TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   const hybrid::Scene scene = load(block("spacing = 1\n"));
   for (const double step_m : {-1e-4, 1e-4}) {
@@ -252,8 +252,8 @@ TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   }
 }
 
-// Round a closed path, slow or fast, frictionless tissue gives the hand no energy: down and up; down, aside,
-// up and back; and in reverse, from tissue that is 1 % softer to stiffer tissue.
+// On closed paths, slow or fast, frictionless tissue gives the hand no energy. The paths are down and up,
+// then down, aside, up and back, and the latter in reverse. Aside, the tissue is 1 % softer.
 TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   const glm::dvec3 above(0.0, 0.0, 0.043), deep(0.0, 0.0, 0.037), aside(0.005, 0.0, 0.0);
   const std::vector<std::vector<glm::dvec3>> paths{
@@ -281,8 +281,8 @@ TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   }
 }
 
-// Over fat that skin squeezes to its limits a tool slides without a step in its force. From tick to tick the
-// force changes by no more than during pressing at the same speed.
+// A tool slides on skin that squeezes fat to its limits, without steps in its force. From tick to tick the
+// force changes at most 1.2 times as much as during pressing at the same speed.
 TEST_F(GridSession, ATightChainOfLayersIsSmoothToSlideOn) {
   for (const auto& young : {std::array{20000, 5000, 10000}, {100000, 3250, 11100}}) {
     const glm::dvec3 above(0.0, 0.0, 0.041), deep(0.0, 0.0, 0.036), aside(0.005, 0.0, 0.0);
@@ -304,7 +304,8 @@ TEST_F(GridSession, ATightChainOfLayersIsSmoothToSlideOn) {
   }
 }
 
-// A slab of 15,360 voxels that two sides hold, 1 mm over a round bone, and beside it a wall.
+// A scene with a slab of 15,360 voxels, held at two sides. It lies 1 mm above a round bone, and a wall is
+// beside it.
 std::string slab_on_bone(double turned_deg) {
   return fmt::format(
              "format = 1\n[tool]\nradius = 6\nstiffness = 1000\n[material.tissue]\nyoung = 5000\npoisson = "
@@ -330,8 +331,9 @@ double overlap(tests::Touch& touch) {
   return most;
 }
 
-// Pressed onto a bone, tissue feels as at rest while the tool moves. Hand, bone and anchors balance. The bone
-// is beyond the finest patch: voxels between coarse nodes may overlap it by a fiftieth of a spacing.
+// The tool presses tissue onto a bone. While it moves, the force is that at rest. Hand, bone and anchors
+// balance. The bone is outside the finest patch, so voxels between coarse nodes may overlap it by a fiftieth
+// of a spacing.
 TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
   for (const double turned_deg : {0.0, 180.0}) {
     const hybrid::Scene scene = load(slab_on_bone(turned_deg));
@@ -363,7 +365,7 @@ TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
   }
 }
 
-// After a contact tissue is at rest at once, and its obstacles are those of rest.
+// After a contact, tissue is at rest at once, and its obstacles are those at rest.
 TEST_F(GridSession, ObstaclesAreThoseOfRestAfterAContact) {
   tests::Touch touch(load(slab_on_bone(0.0)), {0.0, 0.0, 0.019}, true);
   const auto obstacles = touch.state().soft[0]->obstacles();
@@ -376,7 +378,7 @@ TEST_F(GridSession, ObstaclesAreThoseOfRestAfterAContact) {
   }
 }
 
-// Round a closed path beside a bone frictionless tissue gives the hand no energy.
+// On a closed path beside a bone, frictionless tissue gives the hand no energy.
 TEST_F(GridSession, AClosedPathBesideABoneGivesTheHandNoEnergy) {
   const glm::dvec3 above(0.0, 0.0, 0.019), deep(0.0, 0.0, 0.0135), aside(0.003, 0.0, 0.0);
   const hybrid::Scene scene = load(slab_on_bone(0.0));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The session of a window: edits between ticks, pause, single ticks and slow motion, and a recording that
-// replays to the same state.
+// The session of a window: edits between ticks, pause, single ticks, slow motion, and a recording whose
+// replay ends in the same state.
 #include "hybrid/session/player.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ TEST_F(PlayerOf, AnEditedSessionReplaysToTheSameState) {
     steps(40);
     player_->edit({0, 1, tissue_factor, 4.0});
     player_->edit({0, 0, static_friction, 0.9});
-    player_->edit({0, 0, tissue_factor, 4.0});  // it has no such value
+    player_->edit({0, 0, tissue_factor, 4.0});  // a rigid object has no tissue factor
     steps(100, {.dragging = true, .goal_m = {3e-3, 0.0, 4e-3}});
     steps(150);
     const hybrid::Recording recording = player_->recording(text_);

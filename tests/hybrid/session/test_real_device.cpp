@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sessions on a real device, simulated by the test double of its driver's library.
+// Sessions on a real device, which the test double of its driver's library simulates.
 #include "hybrid/session/real_device.h"
 
 #include <gmock/gmock.h>
@@ -73,8 +73,8 @@ TEST_F(RealDevice, ABallIsFeltThroughIt) {
   EXPECT_EQ(played.scene.opened_limits->max_force_N, 3.3);
   EXPECT_THAT(played.placed, HasSubstr("at scale 1"));
   EXPECT_EQ(rig_.hd->misuse, 0U);
-  // After all ramps: K times the depth under the ball's top, along the device's y, at most the device's force
-  // limit.
+  // After all ramps, the force is K times the depth under the ball's top, along the device's y. It is at most
+  // the device's force limit.
   double most = 0.0;
   for (std::size_t i = 1000; i + 1 < rig_.hd->forces.size(); ++i) {
     const double y_mm = 38.0 + 20.0 * std::sin(2.0 * M_PI * 1e-3 * static_cast<double>(i));
@@ -152,7 +152,7 @@ TEST_F(RealDevice, ASceneThatIsTooLargeIsToldAndFitted) {
       "\"phantom\"\n";
   EXPECT_THAT(play(write("large.toml", large), 0.01).placed,
               HasSubstr("out of its reach: [device] scale = 4.35"));
-  // 300 mm and the tool's 2 mm on each side, over a workspace 70 mm deep.
+  // The scale is 300 mm plus the tool's 2 mm on each side, divided by the workspace's depth of 70 mm.
   EXPECT_THAT(play(write("large.toml", large + "scale = \"fit\"\n"), 0.01).placed,
               HasSubstr("at scale 4.34"));
 }

@@ -139,7 +139,7 @@ std::vector<hybrid::Edit> some_edits(const hybrid::World& world) {
   if (!world.soft.empty()) at(260, static_cast<std::uint32_t>(world.rigid.size()), tissue_factor, 2.5);
   at(300, hybrid::Edit::kTool, coupling_stiffness, 450.0);
   at(420, 0, dynamic_friction, 0.1);
-  at(500, hybrid::Edit::kTool, coupling_stiffness, -1.0);  // refused
+  at(500, hybrid::Edit::kTool, coupling_stiffness, -1.0);  // this edit is refused
   return edits;
 }
 
@@ -184,15 +184,14 @@ TEST_F(RecordingFile, WithoutEditsItIsAFileOfTheVersionBefore) {
   EXPECT_EQ(refusal_of(bytes), "");
   EXPECT_NE(refusal_of(bytes.substr(0, bytes.size() - 1)), "") << "a part of an edit";
   std::string wrong = bytes;
-  wrong[wrong.size() - 12] = 99;  // the quantity
+  wrong[wrong.size() - 12] = 99;  // changes the quantity
   EXPECT_NE(refusal_of(wrong).find("damaged edits"), std::string::npos);
   recorded.edits = {{.tick = 7}, {.tick = 3}};  // a replay would apply the second one late
   hybrid::save_recording(folder_ / "b.rec", recorded);
   EXPECT_NE(refusal_of(read(folder_ / "b.rec")).find("damaged edits"), std::string::npos);
 }
 
-// A device that moves between the start of a session and its first tick, as happens if the first tick is
-// late.
+// A device that moves between the start of a session and its first tick, as if the first tick were late.
 class MovesOn final : public device::HapticDevice {
  public:
   explicit MovesOn(std::shared_ptr<const device::Path> path) : path_(std::move(path)) {}
@@ -291,8 +290,8 @@ TEST_F(RecordingFile, WithMotionAndSurfaceFeelItIsTheSameToTheBit) {
   EXPECT_NE(hybrid::hash_state(0, *built.state), before);
 }
 
-// A wall far stiffer than the loop can keep stable, with all memory of the limits and of the passivity
-// controller.
+// A wall far stiffer than the loop can keep stable. So the limits and the passivity controller use all their
+// memory.
 TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) {
   const auto file =
       write("wall.toml",
@@ -305,7 +304,8 @@ TEST_F(RecordingFile, WithPassivityControlDelayAndLateTicksItIsTheSameToTheBit) 
   hybrid::SessionOptions options;
   const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
   EXPECT_GT(built.state->passive.acted, 10U);
-  // Energy given out, computed from the trace: at most the largest work of one tick, plus 0.1 µJ.
+  // The energy given to the hand, computed from the trace, is at most the largest work of one tick plus 0.1
+  // µJ.
   double given_J = 0.0, worst_J = 0.0;
   for (std::size_t n = 1; n < result.rows.size(); ++n) {
     const double work =
@@ -356,8 +356,8 @@ TEST_F(RecordingFile, AFlippedBitOfAnInputIsNoticedAtItsTick) {
   const std::size_t first = bytes.size() - kTickBytes * good.ticks.size();
   for (const std::size_t tick : {std::size_t{0}, std::size_t{50}, std::size_t{200}, good.ticks.size() - 1}) {
     std::string flipped = bytes;
-    flipped[first + kTickBytes * tick + 16 + 5] =
-        static_cast<char>(flipped[first + kTickBytes * tick + 16 + 5] ^ 0x10);  // z: a few micrometers
+    flipped[first + kTickBytes * tick + 16 + 5] = static_cast<char>(
+        flipped[first + kTickBytes * tick + 16 + 5] ^ 0x10);  // changes z by a few micrometers
     const auto result = hybrid::replay(hybrid::load_recording(write("b.rec", flipped)), {});
     EXPECT_FALSE(result.equal);
     EXPECT_EQ(result.first_difference, tick);

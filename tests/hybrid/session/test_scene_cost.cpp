@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cost that `hybrid check` states: measured where the path touches something, and only there.
+// The cost that `hybrid check` states. It is measured only where the path touches something.
 #include "hybrid/session/scene_cost.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Edited values in a scene's text: the values change, everything else stays, and the scene reads as edited.
+// Edited values in a scene's text. Only the values change, and the text reads as the edited scene.
 #include "hybrid/session/scene_text.h"
 
 #include <gtest/gtest.h>
@@ -75,7 +75,7 @@ TEST_F(SceneText, AKeyThatTheSceneLacksIsAdded) {
   EXPECT_EQ(edited.left.size(), 0U);
 }
 
-// The text stays as it is, and the reason is said.
+// The text stays unchanged, and the reason is reported.
 TEST_F(SceneText, WhatHasNoPlaceIsLeft) {
   const std::string text =
       "format = 1\ntool = { radius = 2 }\nrigid = [{ name = \"a\", primitive = \"ball\", radius = 4, "
@@ -97,7 +97,7 @@ TEST_F(SceneText, WhatHasNoPlaceIsLeft) {
   EXPECT_NE(edited.left[4].find("may share a material"), std::string::npos);
 }
 
-// Values within tables on one line change too.
+// Values in tables that are written on one line change too.
 TEST_F(SceneText, ValuesWithinALineChange) {
   const std::string text =
       "format = 1\nunits = \"m\"\ntool = { radius = 0.002, stiffness = 1e3 } # one line\n";

@@ -22,7 +22,7 @@ hybrid::Scene cube(device::DeviceModel model) {
   return scene;
 }
 
-constexpr double kTouched = 0.028;  // the ball of 8 mm touches the top at 20 mm
+constexpr double kTouched = 0.028;  // (m) height at which the ball of 8 mm touches the top at 20 mm
 
 TEST(CubeSession, NothingIsFeltBeforeContact) {
   for (const auto model : {device::DeviceModel::ideal, device::DeviceModel::premium_1_5}) {
@@ -43,7 +43,7 @@ TEST(CubeSession, NothingIsFeltBeforeContact) {
 }
 
 TEST(CubeSession, TheForceRisesWithTheDepth) {
-  // 6 mm deep at 20 mm/s: 15 ticks for each hundredth of the way.
+  // The tool moves at 20 mm/s, to a depth of 6 mm.
   const hybrid::Scene scene = cube(device::DeviceModel::ideal);
   Touch touch(scene, {0, 0, 0.030});
   double most = 0.0, worst_drop = 0.0;
@@ -164,7 +164,7 @@ TEST_F(BadInput, ThatIsFarAwayOrComesAtOddTimesStaysFinite) {
       ++n;
     }
   }
-  // The scene can still be touched.
+  // The scene can still be touched afterwards.
   for (int back = 0; back < 5000; ++back) touch.at({0, 0, 0.05});
   EXPECT_LE(glm::length(touch.at({0, 0, 0.05}).force_N), 1e-9);
   touch.go({0, 0, 4e-3}, 1e-4, 300);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scenes from real data: bones and organs of a CT, and published meshes, good and bad.
+// Scenes from real data: bones and organs of a CT, and published meshes, both good and damaged.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ using tests::Touch;
 
 class Abdomen : public tests::SceneFile {
  protected:
-  // `bones` and `organs` are numbers of totalsegmentator_v2_ct_labels.csv.
+  // `bones` and `organs` are label numbers of totalsegmentator_v2_ct_labels.csv.
   hybrid::Scene scene(const std::string& bones, const std::string& organs) const {
     const auto labels = (tests::shared_data("data/volumes") / "ts_ct_abdomen_3mm_labels.nii.gz").string();
     std::ostringstream text;
@@ -39,7 +39,7 @@ class Abdomen : public tests::SceneFile {
   }
 };
 
-// The vertex of a surface furthest along a direction: no part of the object is in front of it.
+// The vertex of a surface that is furthest along a direction. No part of the object is in front of it.
 dvec3 outermost(const polygon::TriangleMesh& mesh, const auto& to_scene, const dvec3& direction) {
   dvec3 best = to_scene(mesh.vertices.front());
   for (const dvec3& v : mesh.vertices) {
@@ -73,8 +73,8 @@ TEST_F(Abdomen, BonesAndOrgansOfACtAreFeltBoth) {
         ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), 1e-9);
       }
     };
-    // 150 ticks towards the outermost point of each object, 4 mm deep and out again, from the left and from
-    // the front.
+    // From the left and from the front, the tool moves towards the outermost point of each object, 4 mm deep,
+    // and out again.
     for (const dvec3& direction : {dvec3(1, 0, 0), dvec3(0, -1, 0)}) {
       for (const dvec3& at :
            {outermost(
@@ -110,8 +110,8 @@ class Meshes : public tests::SceneFile {
     return all;
   }
 
-  // The mesh as a rigid object with a longest side of 0.2 m, and a stroke of 200 ticks from above to its
-  // middle.
+  // Does a stroke of 200 ticks from above to the middle of the mesh. The mesh is a rigid object with a
+  // longest side of 0.2 m.
   static void stroke(const std::filesystem::path& file) {
     const auto mesh = polygon::load_mesh(file).mesh;
     dvec3 low(1e300), high(-1e300);
@@ -137,7 +137,7 @@ class Meshes : public tests::SceneFile {
     touch.go(middle, step, 50, [&](const TickResult& felt) {
       ASSERT_TRUE(tests::finite(felt.force_N) && tests::finite(felt.proxy_m));
       ASSERT_LE(glm::length(felt.force_N), touch.world().limits.max_force_N * (1.0 + 1e-12));
-      // The proxy minimises the distance to the device: it is never further than at the start.
+      // The proxy minimises the distance to the device. So it is never further away than at the start.
       ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), glm::length(start - middle) + 1e-3);
       if (felt.contacts == 0 && felt.proxy_m != felt.device_m) {
         ASSERT_LE(glm::length(felt.proxy_m - felt.device_m), 1e-9);
@@ -172,7 +172,7 @@ TEST_F(Meshes, ThatAreBadAreTouchedOrRefusedInWords) {
     } catch (const polygon::MeshError& error) {
       EXPECT_GT(std::string(error.what()).size(), 20U);
     }
-    // A mesh that the loader refuses is refused by the scene too, with its place.
+    // A mesh that the loader refuses is also refused in a scene, with its place.
     hybrid::Scene scene;
     scene.file = "scene.toml";
     scene.rigid.push_back({.name = "mesh",

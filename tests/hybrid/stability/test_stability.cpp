@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The measured boundaries of the haptic loop against theory, at a handful of settings; `hybrid stability`
-// measures them all. And what is felt of a vibration.
+// The measured boundaries of the haptic loop against theory, at a few settings. `hybrid stability` measures
+// all settings. Also the perception of vibrations.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -64,7 +64,7 @@ TEST(MeasuredStability, IsThatOfTheEigenvalues) {
   expect_stable_as_eigenvalues_say(firm, "a firm grip, two ticks");
 }
 
-// Not only where it changes its sign: the rate itself is that of the largest eigenvalue.
+// Not only the sign of the growth rate, but also its value is that of the largest eigenvalue.
 TEST(MeasuredStability, TheEnvelopeGrowsByTheSpectralRadius) {
   const LoopSetting setting = bare(1.0);
   for (const double stiffness : {1960.0, 1995.0, 2010.0, 2050.0}) {
@@ -76,7 +76,7 @@ TEST(MeasuredStability, TheEnvelopeGrowsByTheSpectralRadius) {
 
 // ---- passivity ------------------------------------------------------------------------------------------
 
-// At every frequency, the energy that comes out is what the formula says is needed to take it away.
+// At every frequency, the measured damping that absorbs the energy from the wall equals that of the formula.
 TEST(MeasuredPassivity, EveryFrequencyNeedsTheDampingOfTheFormula) {
   constexpr double kStiffness = 1500.0;
   for (const LoopSetting& setting : {bare(1.0), bare(1.0, 1), bare(1.0, 2, 0.8), bare(1.0, 0, 2.0, 4000.0)}) {
@@ -84,7 +84,8 @@ TEST(MeasuredPassivity, EveryFrequencyNeedsTheDampingOfTheFormula) {
     for (int cycles = 1; cycles <= 64; cycles += 7) {
       const hybrid::DrivenMotion motion{.cycles = cycles, .phase_rad = 1.0};
       const hybrid::CycleEnergy energy = hybrid::drive(wall(), setting, motion);
-      const double needed = energy.from_wall_J / energy.dissipated_J;  // of a mechanism with b = 1
+      const double needed =
+          energy.from_wall_J / energy.dissipated_J;  // damping in units of the mechanism's, which is 1 N·s/m
       const double theta = 2.0 * std::numbers::pi * cycles / motion.ticks;
       EXPECT_NEAR(needed, device::passive_damping_at(hybrid::bare_loop(setting), kStiffness, theta), 1e-5)
           << cycles << " cycles, delay " << setting.delay_ticks;
@@ -103,12 +104,13 @@ TEST(MeasuredPassivity, IsThatOfColgateAndSchenkel) {
   }
 }
 
-// The tick leaves damping out that gives energy back, so a damped wall is as passive as one without damping.
+// With its account, the tick suspends damping that would return energy. So a damped wall is as passive as one
+// without damping.
 TEST(MeasuredPassivity, TheAccountOfDampingTakesItsPartAway) {
   for (const bool account : {false, true}) {
     LoopSetting setting = bare(4.0, 0, 3.5);
     setting.damping_account = account;
-    double worst = 0.0;  // energy out, of what is dissipated
+    double worst = 0.0;  // energy from the wall, relative to the dissipated energy
     wall().restart(setting, 0.98 * 2.0 * 4.0 * 1000.0);
     for (int cycles = 1; cycles <= 64; cycles += 3) {
       const hybrid::CycleEnergy energy = hybrid::drive(
@@ -162,7 +164,7 @@ TEST(Vibration, AToneIsFoundWithItsAmplitudeWhereverItLies) {
   for (const double frequency : {40.0, 101.0, 100.5, 317.3}) {
     std::vector<double> motion;
     motion.reserve(1000);
-    for (int n = 0; n < 1000; ++n)  // on a drift, as of a creeping press
+    for (int n = 0; n < 1000; ++n)  // with a drift, as during a press that creeps
       motion.push_back(2e-3 + 1e-7 * n +
                        3e-6 * std::sin(2.0 * std::numbers::pi * frequency * n / 2000.0 + 0.4));
     const hybrid::Vibration found = hybrid::strongest_vibration(motion, 2000.0);
@@ -185,7 +187,7 @@ TEST(Vibration, OfTwoTonesTheOneThatIsFelt) {
   EXPECT_EQ(hybrid::strongest_vibration(std::vector<double>(5, 1.0), 1000.0).felt, 0.0);
 }
 
-// ---- around it ------------------------------------------------------------------------------------------
+// ---- the search, refusals and the report ------------------------------------------------------------
 
 TEST(FirstNotSo, IsTheLeastBoundaryOrNone) {
   const auto below = [](double limit) { return [limit](double x) { return x < limit; }; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A share of the extremes suite, and of the fuzzed ticks. The whole of both is run by the program:
-// `hybrid stability SCENE --extremes --fuzz-ticks 1000000`; so is HYBRID_FUZZ_TICKS here.
+// A part of the suite of extremes, and some fuzzed ticks. The program runs all of both: `hybrid stability
+// SCENE --extremes --fuzz-ticks 1000000`. Here HYBRID_FUZZ_TICKS sets the number of ticks.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -64,8 +64,7 @@ class AnyInput : public tests::SceneFile {
                           kInf = std::numeric_limits<double>::infinity();
 };
 
-// A tick in which no time passes, or a time that is none, changes no clock; and what is no place is not gone
-// to.
+// A tick whose length is 0, negative or not finite does not change the clock.
 TEST_F(AnyInput, NoTimeIsNoTime) {
   Touch touch(mixed(), {0, 0, 0.05});
   touch.at({0.005, 0, 0.009});
@@ -97,7 +96,8 @@ TEST_F(AnyInput, TheLastGoodPlaceHolds) {
   EXPECT_EQ(touch.state().faults, hybrid::fault_nonfinite_input);
 }
 
-// However late it is, the same is felt, to the bit. 1,024 ticks a second, so that every time is exact.
+// However late the session's clock is, the felt force is the same to the bit. The rate is 1,024 ticks per
+// second, so that every time is exact.
 class Late : public tests::SceneFile {
  protected:
   std::uint64_t hash(const std::string& text, std::uint64_t start_ticks) const {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Precedence of objects in contact: one scene for each rule, and the same four bounds for all scenes. (a)
-// After every tick no voxel's ball is deeper than a twentieth of a spacing in a rigid object. (b) At rest
-// anchors and rigid surfaces carry the force on the hand. (c) Nothing passes through anything at 1 m/s. (d) A
-// closed path gives the hand no energy.
+// Precedence of objects in contact: one scene for each rule, and four bounds for all scenes. (a) After every
+// tick, no voxel's ball is deeper than a twentieth of a spacing in a rigid object. (b) At rest, anchors and
+// rigid surfaces carry the force on the hand. (c) Nothing passes through anything at 1 m/s. (d) A closed path
+// gives the hand no energy.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,22 +29,22 @@ using tests::Touch;
 // A path of the tool from its first point to its last, and the faces that it must not pass.
 struct Stroke {
   std::vector<dvec3> points_mm;
-  std::vector<Face> fronts{};  // tested for the tool's centre
-  // Wider bounds for the cases that do not keep the common ones; the reason stands beside each.
+  std::vector<Face> fronts{};  // faces in front of which the tool's centre must stay
+  // The common bounds. A case may state wider ones, with the reason beside it.
   double deepest = 0.05;   // spacings
-  std::size_t passed = 0;  // voxels in a solid, summed over the ticks
+  std::size_t passed = 0;  // number of voxels in a solid, summed over the ticks
 };
 
 struct Scenario {
   const char* name;
-  const char* file;  // from the top folder
+  const char* file;  // path from the top folder
   std::vector<Stroke> strokes;
-  std::vector<std::vector<dvec3>> loops_mm;     // each ends where it begins
+  std::vector<std::vector<dvec3>> loops_mm;     // closed paths of the tool
   std::vector<std::pair<Face, Face>> facing{};  // faces of soft objects that may not overlap
-  std::vector<dvec3> holds_mm{};                // rest points besides the path's end
-  bool asynchronous = false;                    // relaxes tissue asynchronously
-  bool bricks = false;                          // with the trilinear energy
-  double balance = 0.01;                        // share of the force
+  std::vector<dvec3> holds_mm{};  // further places at which the tool rests before the path's last point
+  bool asynchronous = false;      // tissue is relaxed asynchronously
+  bool bricks = false;            // tissue has the trilinear energy
+  double balance = 0.01;          // allowed imbalance at rest, relative to the force
 };
 std::string full_name(const Scenario& scenario) {
   return std::string(scenario.name) + (scenario.asynchronous ? "RelaxedApart" : "") +
@@ -55,7 +55,7 @@ void PrintTo(const Scenario& scenario, std::ostream* out) {
   *out << full_name(scenario);
 }
 
-constexpr double kOverlap = 0.05;  // of the spacing
+constexpr double kOverlap = 0.05;  // largest allowed overlap (spacings)
 constexpr double kGain_J = 1e-6;
 
 class Arbitration : public ::testing::TestWithParam<Scenario> {
@@ -73,8 +73,8 @@ class Arbitration : public ::testing::TestWithParam<Scenario> {
       return {{{press->from_m}, {press->to_m, press->hold_s}, {press->from_m, 0.1}}, press->speed_m_per_s};
     return std::get<device::WaypointPath>(scene.path);
   }
-  // Largest overlap of two faces of soft objects that must not overlap (spacings); negative: their distance.
-  // A surface is half a spacing outside its voxels' centres.
+  // Largest overlap of the pairs of facing soft faces (spacings). Negative values are distances. A surface is
+  // half a spacing outside its voxels' centres.
   static double overlap(Touch& touch) {
     double deepest = -std::numeric_limits<double>::infinity();
     for (const auto& [a, b] : GetParam().facing) {
@@ -103,7 +103,7 @@ TEST_P(Arbitration, NothingOverlapsAndAtRestForcesBalance) {
   dvec3 device_before(0.0);
   const auto see = [&](const TickResult& felt) {
     watch.check(touch.state(), felt);
-    // After every tick with motion, and after every eighth tick at rest.
+    // Soft overlap is checked after every tick with motion, and after every eighth tick at rest.
     if (felt.device_m != device_before || seen++ % 8 == 0) soft = std::max(soft, overlap(touch));
     device_before = felt.device_m;
   };
@@ -131,7 +131,8 @@ TEST_P(Arbitration, NothingOverlapsAndAtRestForcesBalance) {
     }
     const dvec3 force = coupling(felt);
     if (force == dvec3(0.0)) continue;
-    // Rigid surfaces that the tool touches carry the part that the tissue's supports do not carry.
+    // Rigid surfaces that the tool touches carry the part of the force that the tissue's supports do not
+    // carry.
     const dvec3 off = tests::rest_beyond_rigid(touch.world(), touch.state(), force + carried);
     std::printf(
         "%s at (%g, %g, %g): %d ticks, hand (%.4f, %.4f, %.4f) N, anchors (%.4f, %.4f, %.4f), bone (%.4f, "
@@ -199,9 +200,9 @@ struct Work {
   double soft_J = 0.0, rigid_J = 0.0;
 };
 
-// Energy that the hand gains in one tick. The trapezoid between two ticks is exact for forces that vary
-// linearly. Where the tool meets or leaves a rigid surface between the ticks, the trapezoid's error is up to
-// K·h²/8 for a step h: 8 uJ at 0.25 m/s. There the energy in the coupling is known, and is used instead.
+// Energy that the hand gains in one tick. The trapezoidal rule between two ticks is exact for forces that
+// vary linearly. If the tool meets or leaves a rigid surface between the ticks, the rule's error is up to
+// K·h²/8 for a step h: 8 uJ at 0.25 m/s. In this case the change of the coupling's energy is used instead.
 Work work_of_tick(const TickResult& before, const TickResult& now, double stiffness_N_per_m) {
   const dvec3 way = now.device_m - before.device_m;
   const double soft = 0.5 * glm::dot(before.soft_N + now.soft_N, way);
@@ -229,7 +230,8 @@ TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
             touch.go(1e-3 * point, 1e-3 * speed, 0, [&](const TickResult& felt) {
               watch.check(touch.state(), felt);
               if (felt_ticks++ % 4 == 0)
-                soft = std::max(soft, overlap(touch));  // not each tick: the check takes longer than a tick
+                soft = std::max(
+                    soft, overlap(touch));  // not at each tick, because the check takes longer than a tick
               const Work gain = work_of_tick(before, felt, touch.world().tool.stiffness_N_per_m);
               work.soft_J += gain.soft_J, work.rigid_J += gain.rigid_J;
               before = felt;
@@ -237,11 +239,11 @@ TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
             });
           }
         }
-        // Where the tool rounds an edge of bone the force turns between two ticks. The trapezoid's error is
-        // then proportional to the square of the step: 2.49, 0.65 and 0.13 uJ at 0.25, 0.125 and 0.0625 m/s
-        // round the tissue's edge. (Forces have kinks there: Simpson's rule gives 2.87.) So Richardson
-        // extrapolation removes the error at the highest speed. Tissue's work depends on the speed, and
-        // counts without correction.
+        // When the tool moves around an edge of bone, the force turns between two ticks. Then the error of
+        // the trapezoidal rule is proportional to the square of the step: 2.49, 0.65 and 0.13 uJ at 0.25,
+        // 0.125 and 0.0625 m/s around the tissue's edge. Simpson's rule is no better (2.87 uJ), because the
+        // force has kinks there. So Richardson extrapolation removes the error at the highest speed. The work
+        // of tissue depends on the speed, and counts without correction.
         const double rigid_J = speed == 0.25 ? (4.0 * slower.rigid_J - work.rigid_J) / 3.0 : work.rigid_J;
         std::printf(
             "%s, loop of %zu corners at %g m/s %s: tissue %.3f uJ, rigid %.3f (%.3f by ticks); at most %.2f "
@@ -300,7 +302,7 @@ std::vector<Scenario> scenarios() {
        {{{-8, 0, 20}, {-8, 0, 13}, {8, 0, 13}, {8, 6, 13}, {-8, 6, 13}, {-8, 0, 13}, {-8, 0, 20}},
         {{-4, 0, 20}, {-4, 0, 10}, {4, 0, 10}, {4, 4, 10}, {-4, 4, 10}, {-4, 0, 10}, {-4, 0, 20}}},
        {{{0, 2, true}, {1, 2, false}}},
-       // The chain is tight from the tool to the other object from z = 6 on in both objects.
+       // From z = 6 mm downwards, the chain is tight through both objects.
        {{0, 0, 8}, {0, 0, 7}, {0, 0, 6}, {0, 0, 5}}},
       {"BetweenBoneAndTissue",
        "scenes/cleft.toml",
@@ -318,12 +320,13 @@ std::vector<Scenario> scenarios() {
   };
 }
 
-// Scenarios on bricks, with the bounds that bricks do not keep.
+// The scenario on bricks, without the cases in which bricks do not keep the bounds.
 Scenario of_bricks(Scenario scenario) {
   scenario.asynchronous = scenario.bricks = true;
   if (std::string_view(scenario.name) == "TissueOnTissue") {
-    // With links of both objects at their limits the force varies from tick to tick; the test below covers z
-    // = 7. At z = 6 the error is 2.5 % on average and 4 % in single ticks, at z = 5 1.6 % and 29 %.
+    // If links of both objects are at their limits, the force varies from tick to tick. The test below covers
+    // z = 7 mm. At z = 6 mm the error is 2.5 % on average and 4 % in single ticks, at z = 5 mm 1.6 % and 29
+    // %.
     scenario.holds_mm.resize(1);
   }
   return scenario;
@@ -342,7 +345,7 @@ std::vector<Scenario> in_all_ways() {
 INSTANTIATE_TEST_SUITE_P(Rules, Arbitration, ::testing::ValuesIn(in_all_ways()),
                          [](const auto& s) { return full_name(s.param); });
 
-// With links of both objects at their limits the force varies around the carried force by less than a JND.
+// If links of both objects are at their limits, the force varies around the carried force by less than a JND.
 TEST(Bricks, OnBricksWithBothChainsTightTheForceStaysWithinWhatAHandTells) {
   hybrid::Scene scene =
       hybrid::load_scene(tests::source_folder / "tests/hybrid/tick/arbitration/soft_on_soft.toml");
@@ -365,7 +368,7 @@ TEST(Bricks, OnBricksWithBothChainsTightTheForceStaysWithinWhatAHandTells) {
   EXPECT_GT(hand.z, 0.5 * kTicks);
 }
 
-// The bricks' loads travel between the threads with the displacements, and are recorded.
+// The brick loads are exchanged between the threads with the displacements, and a recording replays them.
 TEST(Bricks, ARecordedSessionReplaysToTheBit) {
   tests::expect_replays(tests::source_folder / "scenes" / "layers.toml", 2.0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Begin and end of contact. Nothing is felt and nothing moves before the tool's ball meets an object, judged
-// by exact distances. Contact lasts until the tool leaves.
+// Begin and end of contact. Nothing is felt and nothing moves before the tool's ball meets an object, by
+// exact distances. Contact lasts until the tool leaves.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,8 +32,8 @@ dvec3 direction(std::mt19937& engine) {
   return {std::sqrt(1.0 - z * z) * std::cos(angle), std::sqrt(1.0 - z * z) * std::sin(angle), z};
 }
 
-// Distance from the tool's ball to the nearest surface, from every surface voxel and every rigid surface (m);
-// negative inside, for solids as for tissue.
+// Distance from the tool's ball to the nearest surface voxel or rigid surface (m). It is negative inside
+// solids and tissue.
 double gap(Touch& touch, const dvec3& at) {
   double least = std::numeric_limits<double>::infinity();
   const double radius = touch.world().tool.radius_m;
@@ -61,7 +61,7 @@ bool moved(const voxel::SoftObject& object) {
                      [&](voxel::VoxelId v) { return object.state().at(v) != dvec3(0.0); });
 }
 
-// Centre of a soft object's surface voxels, and their largest distance from it (m, scene frame).
+// Centre and half diagonal of the bounds of a soft object's surface voxels (m, scene frame).
 std::pair<dvec3, double> extent(Touch& touch, std::size_t o) {
   const voxel::SoftObject& object = *touch.state().soft[o];
   dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
@@ -75,12 +75,12 @@ std::pair<dvec3, double> extent(Touch& touch, std::size_t o) {
 
 class Approach : public ::testing::TestWithParam<const char*> {};
 
-// The build removed all overlap, so that no object presses on another at rest. The tool approaches from any
-// direction.
+// The build has removed all overlap, so no object presses on another at rest. The tool approaches from random
+// directions.
 TEST_P(Approach, NothingIsFeltBeforeContact) {
   constexpr int kWays = 40;
-  constexpr double kStep = 2e-4, kFast = 1e-3;  // m per tick, near and far
-  constexpr double kRounding = 1e-9;            // m: positions are floats
+  constexpr double kStep = 2e-4, kFast = 1e-3;  // steps (m per tick) near the object and far from it
+  constexpr double kRounding = 1e-9;            // (m) because positions are floats
   const hybrid::Scene scene = hybrid::load_scene(tests::source_folder / GetParam());
   std::mt19937 engine(6);
   double latest = 0.0;
@@ -88,7 +88,7 @@ TEST_P(Approach, NothingIsFeltBeforeContact) {
   for (int n = 0; n < kWays; ++n) {
     const auto [middle, size] = extent(at_rest, static_cast<std::size_t>(n) % at_rest.state().soft.size());
     const dvec3 way = direction(engine);
-    // Towards a random place in the middle half of the object.
+    // The tool moves towards a random place in the inner part of the object.
     const dvec3 to = middle + 0.25 * size * direction(engine), from = to - (1.5 * size + 0.02) * way;
     ASSERT_GT(gap(at_rest, from), 0.0) << "way " << n << " begins within an object";
     Touch touch(scene, from, n % 2 == 1);
@@ -131,9 +131,9 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Approach,
 class Stroke : public ::testing::TestWithParam<std::tuple<const char*, bool>> {};
 
 // The tool presses, drags, holds and lifts somewhere on the top of the tissue. Contact must be continuous
-// from its first tick to its last (the thesis's Fig 20: it bounced), and the tool must stay on top (Fig 21:
-// it slipped between voxels). Half of the strokes lift quickly until the tool hardly touches, where tissue
-// that lags is left behind.
+// from its first tick to its last (in the thesis's Fig 20 the tool bounced). The tool must stay on top (in
+// Fig 21 it slipped between voxels). Half of the strokes lift quickly until the tool hardly touches. Tissue
+// that lags would lose contact there.
 TEST_P(Stroke, IsOneContact) {
   constexpr int kStrokes = 60;
   const auto [file, asynchronous] = GetParam();
@@ -141,11 +141,12 @@ TEST_P(Stroke, IsOneContact) {
   std::mt19937 engine(20);
   double deepest = 0.0;
   for (int n = 0; n < kStrokes; ++n) {
-    // The block's top is at z = 6 mm and the ball's radius is 4 mm: on top, its centre is at 10 mm.
+    // The block's top is at z = 6 mm, and the ball's radius is 4 mm. So on top its centre is at 10 mm.
     const bool up_fast = n % 2 == 1;
     const double speed = std::exp(between(engine, std::log(up_fast ? 0.2 : 0.01), std::log(0.5)));
     const double depth = between(engine, up_fast ? 2.0 : 0.2, 4.5);
-    const double last = between(engine, 0.25, up_fast ? 0.5 : std::max(0.25, depth));  // bumps are 0.2 high
+    const double last =
+        between(engine, 0.25, up_fast ? 0.5 : std::max(0.25, depth));  // (mm) bumps are 0.2 mm high
     const auto place = [&](double deep) {
       return dvec3(between(engine, -12.0, 12.0), between(engine, -6.0, 6.0), 10.0 - deep);
     };
@@ -185,7 +186,7 @@ INSTANTIATE_TEST_SUITE_P(Blocks, Stroke,
                            return std::string(std::get<1>(s.param) ? "relaxedApart" : "relaxedInTheTick");
                          });
 
-// A device with the mass of a Premium, in a hand that is pulled along.
+// A device with the mass of a Premium. A hand pulls it along by a spring and a damper.
 struct Hand {
   static constexpr double kMass_kg = 0.075, kStiffness_N_per_m = 300.0, kDamping_Ns_per_m = 3.0, kDt_s = 1e-3;
   dvec3 at_m, velocity{0.0};
@@ -197,13 +198,13 @@ struct Hand {
   }
 };
 
-// Lost contacts in strokes of such a hand, while pressing and while dragging.
+// Numbers of lost contacts in strokes of such a hand, while pressing and while dragging.
 struct Lost {
   int pressing = 0, drawing = 0;
 };
 
-// Strokes over a block whose top the tool meets at z = `top_m`. `feel` returns contact and force at a
-// position.
+// Strokes over a block whose top the tool meets at z = `top_m`. `begin` starts a stroke, and `feel` returns
+// contact and force at a position.
 template <class Begin, class Feel>
 Lost strokes_of_a_hand(int count, double top_m, Begin&& begin, Feel&& feel) {
   Lost lost;
@@ -233,8 +234,8 @@ Lost strokes_of_a_hand(int count, double top_m, Begin&& begin, Feel&& feel) {
   return lost;
 }
 
-// The thesis's one-point check loses contact, as the thesis reports, and so does the six-point check that
-// replaced it.
+// The thesis's contact check with one point loses contact, as the thesis reports. The project's own tissue
+// does not. The six-point check is printed for comparison.
 TEST(Hands, LoseContactAsInTheThesisAndNotHere) {
   constexpr int kStrokes = 30;
   constexpr double kTop = 6e-3;

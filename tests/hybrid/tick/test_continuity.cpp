@@ -18,8 +18,8 @@ using tests::between;
 
 constexpr double kSpacing = 1e-3;
 
-// Down, round at random depths, and back up to the start: frictionless tissue returns at most the energy that
-// it received.
+// Paths lead down, around at random depths, and back up to the start. Frictionless tissue returns at most the
+// energy that it received.
 TEST(ClosedPaths, GiveNoEnergy) {
   std::mt19937 engine(4);
   double most = -1.0, least = 0.0;
@@ -53,8 +53,8 @@ TEST(ClosedPaths, GiveNoEnergy) {
   std::printf("closed paths: %.3g to %.3g uJ given to the hand\n", 1e6 * least, 1e6 * most);
 }
 
-// In slow strokes the force stays within a tenth of a JND of the equilibrium's own steps. Faster strokes
-// exceed this at their turning points, but no step is a jump.
+// In slow strokes, the force's steps exceed those of the equilibrium by at most a tenth of a JND. Faster
+// strokes exceed this at their turning points, but by at most 1 JND.
 TEST(Continuity, StepsAreThoseOfTheEquilibrium) {
   const StrokeCase slow{.radius_spacings = 2.0, .depth_spacings = 1.0, .speed_m_per_s = 0.01};
   const StrokeCase slide{

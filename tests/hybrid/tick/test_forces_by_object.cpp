@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The forces by object sum up to the felt force, in every shipped scene and where limits and anchors carry.
+// The forces by object sum up to the felt force, in every shipped scene and where limits and anchors carry
+// the load.
 #include <algorithm>
 #include <filesystem>
 #include <glm/geometric.hpp>
@@ -15,7 +16,7 @@ glm::dvec3 sum_by_object(const hybrid::WorldState& state) {
       [](const glm::dvec3& sum, const hybrid::ObjectFeel& feel) { return sum + feel.on_hand_N; });
 }
 
-// The felt force before its limits.
+// The force before the limits on the felt force (N).
 glm::dvec3 felt(const hybrid::TickResult& tick) {
   return tick.rigid_N + tick.soft_N;
 }
@@ -56,7 +57,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, ForcesByObject, testing::ValuesIn(shipped_scene
 
 class ForceOfAJammedBlock : public tests::SceneFile {};
 
-// A thin block on its anchors, pressed past what its links allow: anchors and limits carry nearly all.
+// A thin block on its anchors is pressed deeper than its links allow. Anchors and limits carry nearly all of
+// the force.
 TEST_F(ForceOfAJammedBlock, IsItsOwn) {
   const hybrid::Scene scene = load(
       "format = 1\n[material.gel]\nyoung = 5000\npoisson = 0.3\nstretch = [0.7, 1.3]\nshear = 0.3\n"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After the build, a tick allocates nothing, takes no lock, waits for no thread, throws nothing, and reads
-// and writes no file. This program counts all such calls of its thread while the thread is watched.
+// After the build, a tick allocates nothing, takes no lock, waits for no thread, throws nothing, and neither
+// reads nor writes a file. This program counts all such calls while its thread is watched.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -53,7 +53,7 @@ void count() noexcept {
   count(&Calls::allocations);
 }
 
-// The next definition of that name in the library order.
+// The next definition of the function `name` in the order of the loaded libraries.
 template <class Function>
 Function* next(const char* name) noexcept {
   const bool was = std::exchange(watched, false);
@@ -65,10 +65,10 @@ Function* next(const char* name) noexcept {
 }  // namespace
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define COUNTS_CALLS 0  // sanitizers have their own
+#define COUNTS_CALLS 0  // sanitizers have their own versions
 #else
 #define COUNTS_CALLS 1
-// The GNU C library's own names of the functions that these replace.
+// The GNU C library's names of the functions that are replaced here.
 // NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
 extern "C" {
 void* __libc_malloc(std::size_t size);
@@ -88,8 +88,8 @@ void* realloc(void* memory, std::size_t size) noexcept {
   return __libc_realloc(memory, size);
 }
 
-// Covers std::mutex and its relatives, std::condition_variable and semaphores; std::atomic::wait() goes
-// through syscall().
+// These cover std::mutex and its relatives, std::condition_variable and semaphores. std::atomic::wait() calls
+// syscall().
 #define COUNTED(of, result, name, parameters, ...)            \
   result name parameters noexcept {                           \
     static auto* const real = next<result parameters>(#name); \
@@ -104,7 +104,7 @@ COUNTED(locks, int, pthread_spin_lock, (pthread_spinlock_t * lock), lock)
 COUNTED(waits, int, sem_wait, (sem_t * semaphore), semaphore)
 COUNTED(waits, int, sched_yield, (), )
 #undef COUNTED
-// Cancellation points: they may throw.
+// These functions are cancellation points, so they may throw.
 #define COUNTED(of, result, name, parameters, ...)            \
   result name parameters {                                    \
     static auto* const real = next<result parameters>(#name); \
@@ -120,7 +120,7 @@ COUNTED(files, ssize_t, write, (int file, const void* from, std::size_t size), f
   static auto* const real = next<void(void*, void*, void (*)(void*))>("__cxa_throw");
   count(&Calls::throws);
   real(thrown, type, destroy);
-  std::abort();  // it does not return
+  std::abort();  // __cxa_throw does not return
 }
 long syscall(long number, ...) noexcept {
   std::va_list arguments;
@@ -136,7 +136,7 @@ long syscall(long number, ...) noexcept {
 // NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
 #endif
 
-// Not inlined: otherwise the compiler reports new and free() as a mismatch.
+// Not inlined, because the compiler would report free() of memory from new as a mismatch.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   count();
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
@@ -198,7 +198,7 @@ TEST(ServoPath, TheCountersCount) {
   EXPECT_EQ(calls.files, 1U);
 }
 
-// Every value of the scene in turns, between its own value and a little more or less.
+// Edits the scene's values in turn. Each is set a little above or below its value in the scene.
 void edit_in_turns(const hybrid::BuiltScene& built, std::uint64_t tick) {
   if (tick % 10 != 0 || values.empty()) return;
   const hybrid::EditableValue& value = values[tick / 10 % values.size()];
@@ -212,7 +212,7 @@ void watch_ticks(const hybrid::Scene& scene, const hybrid::BuiltScene& built, bo
   const auto device = hybrid::scene_device(scene, hybrid::scene_path(scene));
   hybrid::set_flush_to_zero();
   hybrid::begin_session(scene, *built.world, *built.state, device->read().position_m);
-  // Here the tick does the other thread's work, so that this work is watched too.
+  // The tick itself does the other thread's work here, so that this work is watched too.
   if (asynchronous) hybrid::start_async_relaxation(*built.state, hybrid::Arrival::counted);
   const double dt = 1.0 / scene.rate_hz;
   std::size_t felt_ticks = 0;
@@ -291,7 +291,7 @@ TEST_F(ServoPathIn, AllTicksBetweenEdits) {
     watch_ticks(felt, hybrid::build_scene(felt), asynchronous, true);
 }
 
-// The session of a window takes edits and requests, records, and hands every tick over.
+// The session of a window takes edits and requests, records, and passes on every tick.
 TEST_F(ServoPathIn, AllTicksOfAPlayer) {
   const hybrid::Scene pressed =
       load("format = 1\n" + tests::block + tests::ball + "position = [12, 0, 8]\n" + tests::path);
@@ -339,7 +339,7 @@ INSTANTIATE_TEST_SUITE_P(ShippedScenes, ServoPathOf,
                            return name;
                          });
 
-// A scene that is shipped later must be watched too.
+// The list must contain every shipped scene.
 TEST(ServoPath, KnowsEveryShippedScene) {
   std::size_t scenes = 0;
   for (const auto& entry :

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The times of a tick: stages add up to it, and neither counts the time in which the thread did not run.
+// The times of a tick. The stages add up to the tick, and neither counts time in which the thread did not
+// run.
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <sched.h>
@@ -48,7 +49,7 @@ TEST_F(StageTimes, AddUpToTheTickInEveryScene) {
   }
 }
 
-// Another thread takes half of the only processor that both may use.
+// Another thread uses half of the single processor on which both may run.
 TEST_F(StageTimes, DoNotCountPreemption) {
   cpu_set_t before;
   CPU_ZERO(&before);

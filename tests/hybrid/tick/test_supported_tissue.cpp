@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tissue that the tool presses against a plate or against other tissue: no penetration, and the supports
-// carry the felt force.
+// The tool presses tissue against a plate or against other tissue. Nothing penetrates, and the supports carry
+// the felt force.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ const std::string tool_of_5 = "format = 1\n[tool]\nradius = 5\nstiffness = 1000\
 
 class Arbitration : public tests::SceneFile {
  protected:
-  // A block anchored at its sides, 1 mm above a rigid plate that is tilted about y.
+  // A scene with a block that is anchored at its sides, 1 mm above a rigid plate that is tilted about y.
   static std::string block_over_plate(double tilt_degrees, const std::string& plate) {
     std::ostringstream text;
     text << tool_of_5 << "[material.gel]\nyoung = 5000\npoisson = 0.3\n"
@@ -79,7 +79,7 @@ TEST_F(Arbitration, NoVoxelIsPressedIntoAPlate) {
     const double at_rest = deepest(touch);
     double during = 0.0;
     int n = 0;
-    touch.go({0, 0, 0.009}, 4e-5, 0, [&](const TickResult&) {  // 8 mm deep at 40 mm/s
+    touch.go({0, 0, 0.009}, 4e-5, 0, [&](const TickResult&) {  // to a depth of 8 mm at 40 mm/s
       if (++n % 20 == 0) during = std::max(during, deepest(touch));
     });
     const TickResult early = touch.go({0, 0, 0.009}, 1.0, 200);
@@ -92,15 +92,15 @@ TEST_F(Arbitration, NoVoxelIsPressedIntoAPlate) {
     EXPECT_GT(coupling(felt).z, 0.1);
     EXPECT_NEAR(coupling(felt).z, coupling(early).z, 0.05 * coupling(felt).z) << "it holds still";
     EXPECT_EQ(touch.state().nonfinite, 0U);
-    // The tissue does reach the plate: without the plate it is softer.
+    // The tool leaves. Then nothing overlaps, and nothing is felt.
     touch.go({0, 0, 0.04}, 1e-4, 1500);
     EXPECT_LE(deepest(touch), 0.05 + at_rest);
     EXPECT_EQ(touch.at({0, 0, 0.04}).force_N, dvec3(0.0));
   }
 }
 
-// After a jump into a solid, a voxel sees the surface from inside. Its half-space must still point outward,
-// so that the voxel can come out.
+// After a jump into a solid, a voxel is on the inner side of the surface. Its half-space must still point
+// outward, so that the voxel can come out.
 TEST_F(Arbitration, AVoxelWithinASolidIsShownTheWayOut) {
   polygon::save_ply(folder_ / "ball.ply", polygon::make_ball_mesh(6e-3, 3));
   Touch touch(load(tool_of_5 + "[material.loose]\nstretch = [0.001, 1000]\nshear = 1000\n" +
@@ -116,8 +116,8 @@ TEST_F(Arbitration, AVoxelWithinASolidIsShownTheWayOut) {
   for (const voxel::VoxelId v : object.lattice().surface()) {
     const dvec3 at = place(v);
     if (at.z < 6.5e-3 || std::hypot(at.x, at.y) > 4e-3) continue;
-    object.set_obstacle(object.surface_number(v), {});  // as for an object that was far away
-    object.move(v, {0, 0, 10e-3});                      // beyond the middle
+    object.set_obstacle(object.surface_number(v), {});  // no half-space, as if the solid had been far away
+    object.move(v, {0, 0, 10e-3});                      // beyond the solid's middle
     ++inside;
   }
   ASSERT_GE(inside, 4U);
@@ -129,13 +129,13 @@ TEST_F(Arbitration, AVoxelWithinASolidIsShownTheWayOut) {
     if (glm::length(away) >= 6e-3 || o.normal == glm::vec3(0.0F)) continue;
     ++seen;
     EXPECT_GT(glm::dot(dvec3(o.normal), away), 0.9 * glm::length(away));
-    // The half-space brings the voxel out by a quarter of a spacing (of 2 mm) per query. It must never stay
-    // at the voxel's present depth: a fast tool would press the voxel deeper in each tick.
+    // The half-space brings the voxel out by a quarter of a spacing (0.5 mm) per query. It must not stay at
+    // the voxel's present depth, or a fast tool would press the voxel deeper in each tick.
     EXPECT_GE(glm::dot(o.normal, glm::vec3(object.state().at(v))), o.bound - 0.5e-3F - 1e-9F)
         << "not thrown out at once";
   }
   EXPECT_EQ(seen, inside);
-  // From there the voxel comes out and returns.
+  // Then the voxel comes out and returns to rest.
   for (int n = 0; n < 4000 && !object.asleep(); ++n) touch.at({0, 0, 0.05});
   EXPECT_TRUE(object.asleep());
   for (const voxel::VoxelId v : object.lattice().surface())
@@ -154,7 +154,7 @@ TEST_F(Arbitration, APlateBelowIsFeltThroughTheTissue) {
 }
 
 TEST_F(Arbitration, ToolThatSqueezesTissueAgainstAPlateStopsAtWhatIsLeftOfIt) {
-  // Tissue of 8 mm on a plate; the device goes 25 mm into the plate.
+  // 8 mm of tissue lie on a plate. The device moves 25 mm into the plate.
   const std::string scene =
       tool_of_5 +
       "[material.gel]\nyoung = 3000\npoisson = 0.3\n[[soft]]\nname = \"pad\"\nformula = \"block\"\nsize = "
@@ -183,7 +183,7 @@ TEST_F(Arbitration, ToolThatSqueezesTissueAgainstAPlateStopsAtWhatIsLeftOfIt) {
   EXPECT_EQ(touch.at({0, 0, 0.03}).force_N, dvec3(0.0));
 }
 
-// Sum of the link forces on an object's anchors: the force that the object passes to its supports.
+// Sum of the link forces on an object's anchors, the force that the object transfers to its supports (N).
 dvec3 load_on_anchors(const voxel::SoftObject& object) {
   dvec3 sum(0.0);
   for (std::size_t i = 0; i < object.lattice().size(); ++i) {
@@ -194,13 +194,13 @@ dvec3 load_on_anchors(const voxel::SoftObject& object) {
   return sum;
 }
 
-// Presses the scene to a depth below first contact (z = 21 mm) and holds.
+// Presses the scene to a depth below first contact (at z = 21 mm), holds, and checks the balance of forces.
 void expect_balance(double depth_m, double share) {
   const hybrid::Scene scene = hybrid::load_scene(tests::source_folder / "scenes" / "two-soft.toml");
   Touch touch(scene, {0, 0, 0.035});
   touch.go({0, 0, 0.021 - depth_m}, 4e-5, 1500);
   const TickResult felt = touch.at({0, 0, 0.021 - depth_m});
-  // The upper block without the lower one, at rest: the force that its sides alone can carry at this depth.
+  // The upper block without the lower one gives the force that its sides alone carry at this depth.
   hybrid::Scene without = scene;
   without.soft.erase(without.soft.begin());
   Touch alone(without, {0, 0, 0.035});
@@ -219,7 +219,7 @@ void expect_balance(double depth_m, double share) {
   EXPECT_LT(coupling(felt).z, sides_N - lower.z);
   EXPECT_LT(lower.z, -0.004) << "the lower one carries part of it";
   EXPECT_LE(glm::length(lower + upper + coupling(felt)), share * coupling(felt).z);
-  // Then the tool releases.
+  // Then the tool leaves.
   touch.go({0, 0, 0.035}, 1e-4, 3000);
   EXPECT_EQ(touch.at({0, 0, 0.035}).force_N, dvec3(0.0));
   EXPECT_LE(glm::length(load_on_anchors(*touch.state().soft[0])), 0.02 * coupling(felt).z);
@@ -228,13 +228,13 @@ void expect_balance(double depth_m, double share) {
 TEST_F(Arbitration, TwoSoftObjectsBalanceWhatTheToolPresses) {
   for (const double depth : {2.5e-3, 4e-3}) expect_balance(depth, 0.02);
 }
-// The chain under the tool is tight down to voxels that the other object supports. The forces of those tight
-// links are missing from the sum: 3 %.
+// The chain under the tool is tight down to voxels that the other object supports. The sum lacks the forces
+// of these tight links, which are 3 %.
 TEST_F(Arbitration, TwoSoftObjectsNearlyBalanceWhereTheChainIsTight) {
   expect_balance(8e-3, 0.05);
 }
 
-// A single block: the anchors must carry the felt force.
+// With a single block, the anchors must carry the felt force.
 class Reaction : public tests::SceneFile {
  protected:
   void expect_reaction(double depth_m) const {

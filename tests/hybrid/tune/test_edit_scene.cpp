@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Settings that are written into the text of random scenes, and read back.
+// Writes settings into the text of random scenes, and reads them back.
 #include "hybrid/tune/edit_scene.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ class EditScene : public tests::SceneFile {
   int pick(int count) { return std::uniform_int_distribution<int>(0, count - 1)(random_); }
   bool coin() { return pick(2) == 0; }
 
-  // A table's keys in a random order and layout.
+  // Text of a soft object's table, with its keys in a random order and layout.
   std::string table_text(const std::string& name) {
     std::vector<std::string> keys{"name = \"" + name + "\"", "formula = \"block\"",
                                   "size = [ 40,\n  # inner ] comment\n  40, 20 ]"};
@@ -111,10 +111,11 @@ TEST_F(EditScene, ReadBackHasTheWantedValuesAndKeepsTheComments) {
     // A proxy keeps the spacing and energy of the file, as they have no effect.
     expect_values(hybrid::with_setting(as_read, setting), hybrid::load_scene(again));
 
-    // Chosen again, it is the file's own setting, and back again the reasons do not pile up.
+    // The setting is now the file's own, so writing it again changes nothing. Another change replaces the
+    // reason in the file instead of adding one.
     const auto now = hybrid::tunable_objects(hybrid::read_scene(again));
     EXPECT_EQ(hybrid::edited_scene(edited, again, now, hybrid::own_setting(now), "no"), edited);
-    if (now.empty()) continue;  // both are proxies
+    if (now.empty()) continue;  // both objects became proxies
     Setting back = hybrid::own_setting(now);
     back.objects[0].spacing = glm::dvec3(7.0);
     back.objects[0].proxy = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The front and the choice against their definitions, spelt out point by point, on random points.
+// Compares the Pareto front and the choice with their definitions, on random points.
 #include "hybrid/tune/front.h"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ TEST(TuneFront, HasExactlyThePointsThatNoOtherBeats) {
         EXPECT_FALSE(on_front);
         continue;
       }
-      // It is there, or an equal one is.
+      // The point itself or an equal one is on the front.
       EXPECT_TRUE(std::ranges::any_of(front, [&](std::size_t f) {
         return points[f].cost_us == points[n].cost_us && points[f].error_jnd == points[n].error_jnd;
       }));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The search on a small scene: its errors against `compare`, and that a search that was ended goes on.
+// The search for settings on a small scene: its errors equal those of `compare`, and an interrupted search
+// continues where it stopped.
 #include "hybrid/tune/tune.h"
 
 #include <gmock/gmock.h>
@@ -63,7 +64,8 @@ TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
   EXPECT_GT(itself.still.ticks, 50U);
   EXPECT_EQ(itself.moving.max_jnd, 0.0);
   EXPECT_EQ(itself.still.max_jnd, 0.0);
-  // Once slower is the session itself: so small a block has no patches that would be widened.
+  // Slowed down by a factor of 1, the truth is the session itself, because so small a block has no patches to
+  // widen.
   EXPECT_EQ(error(slow(1), hybrid::play_setting(scene, kBlock, motion, {}).course).worst_jnd(), 0.0);
 }
 
@@ -108,7 +110,7 @@ TEST_F(Tune, ASearchThatWasEndedGoesOnAndGivesTheSame) {
   options.cache.clear();
   expect_equal(resumed, hybrid::tune(scene, options), false);
 
-  // The rest of what a user sees is of this result.
+  // This result also gives what a user sees: front, truth, confirmation, text, JSON and plot.
   EXPECT_GE(resumed.front.size(), 3U);
   EXPECT_LT(resumed.truth.error_jnd(), 2.0);
   EXPECT_TRUE(resumed.confirmation.not_done.empty()) << resumed.confirmation.not_done;
@@ -137,7 +139,7 @@ TEST_F(Tune, AnotherSceneAnotherFileAndADamagedRecordAreNotFound) {
   EXPECT_FALSE(found());
 }
 
-// A result of one setting, under the bound.
+// A result with a single setting, whose error of 0.4 JND is within the bound.
 TuneResult one_setting(double truth_error_jnd, double confirmed_jnd) {
   TuneResult result;
   result.settings.resize(1);
@@ -179,7 +181,7 @@ TEST_F(Tune, SettingsBesideOneChangeOneObject) {
   ASSERT_EQ(objects.size(), 2U);
   const auto own = hybrid::own_setting(objects);
   const auto beside = hybrid::settings_beside(objects, own);
-  EXPECT_EQ(beside.size(), 8U);  // coarser, finer, the other energy, as rigid: of each
+  EXPECT_EQ(beside.size(), 8U);  // of each object: coarser, finer, the other energy, rigid
   for (const auto& setting : beside)
     EXPECT_EQ((setting.objects[0] == own.objects[0]) + (setting.objects[1] == own.objects[1]), 1);
   for (const auto& setting : hybrid::common_settings(objects, false))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The pieces of `hybrid validate` against closed forms, and its quick cases against their bounds.
+// Compares the parts of `hybrid validate` with closed forms, and its quick cases with their bounds.
 #include "hybrid/validate/validate.h"
 
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ TEST(ValidationRows, KnowWhatInsideIs) {
   EXPECT_FALSE(spread.fails()) << "it is not stated to hold";
 }
 
-// The tables are those of the published summaries, where these are at hand.
+// The tables in the program equal the published ones. Skipped without the folder of reference data.
 TEST(References, AreThoseOfTheFiniteElements) {
   const auto folder = tests::shared_data("reference");
   SKIP_WITHOUT(folder);
@@ -180,7 +180,7 @@ TEST_F(QuickCases, SiliconesHoldAtTenPercentAndFallShortAtThirty) {
   }
   for (const auto& m : report_.moduli) {
     EXPECT_LT(m.bonded_Pa, m.slipping_Pa) << "bonded plates make the same silicone stiffer";
-    // The authors' modulus is the chord at small strain between plates that slip.
+    // The published modulus is the chord modulus at small strain, measured between plates that slip.
     if (m.published_Pa) {
       EXPECT_NEAR(m.slipping_Pa / *m.published_Pa, 1.0, 0.1) << m.name;
     }

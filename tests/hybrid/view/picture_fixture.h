@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene to draw, and its picture as pixels. Without EGL, the cases that draw are skipped.
+// A scene to draw, and its picture as pixels. Without EGL, tests that draw are skipped.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@
 
 namespace tests {
 
-// A ball of quads by latitude and longitude, without the part above `cut` (in radii).
+// A ball meshed by latitude and longitude, without the part above z = `cut` radii.
 inline polygon::TriangleMesh ball_mesh(const glm::dvec3& centre, double radius, double cut = 2.0,
                                        std::uint32_t rows = 48) {
   polygon::TriangleMesh mesh;
@@ -44,7 +44,7 @@ inline polygon::TriangleMesh ball_mesh(const glm::dvec3& centre, double radius, 
   return mesh;
 }
 
-// A hollow shell, open on top, with a soft ball inside that a tool presses at its top.
+// A hollow shell that is open on top, with a soft ball inside. A tool presses the top of the ball.
 struct Session {
   hybrid::DrawnScene scene;
   hybrid::Snapshot now;
@@ -105,7 +105,7 @@ class Picture : public testing::Test {
     std::error_code ignored;
     std::filesystem::remove(file_, ignored);
   }
-  // Draws, or skips the case if this machine cannot draw.
+  // Draws the picture. If this machine cannot draw, sets `why_not_` and returns an empty image.
   Image draw(const Session& s, const hybrid::PictureOptions& options) {
     try {
       hybrid::save_picture(file_, s.scene, s.now, options);
@@ -124,7 +124,8 @@ class Picture : public testing::Test {
   const Image image = draw(session, options); \
   if (!why_not_.empty()) GTEST_SKIP() << why_not_
 
-// The small picture's layout, the pixel at which it shows a point, and its view of the whole scene.
+// The layout of the small picture. `seen_at` gives the pixel that shows a point, `framed` a camera that shows
+// the whole scene.
 inline const hybrid::FrameLayout small_layout = hybrid::frame_layout(960, 720, false);
 inline glm::dvec2 seen_at(const hybrid::Camera& camera, const glm::dvec3& point_m) {
   return small_layout.pixel(camera, point_m).value_or(glm::dvec2(0.0));

@@ -59,13 +59,12 @@ TEST(Layout, MeasuresHowMuchNearerAViewIs) {
   far.distance_m = 1.0;
   near.distance_m = 0.25;
   const PixelRect scene{0, 0, 900, 800}, inset{0, 0, 400, 400};
-  // Four times nearer, on half the pixels.
+  // The camera is four times nearer, but the view has half as many pixel rows.
   EXPECT_NEAR(hybrid::times_nearer(near, inset, far, scene), 2.0, 1e-12);
   EXPECT_NEAR(hybrid::times_nearer(far, scene, far, scene), 1.0, 1e-12);
 }
 
-// The tool is 8 mm in a scene of 160 mm, then 40 mm: only the first has an inset, in which the tool is
-// larger.
+// The scene measures 160 mm. A tool of 8 mm gets an inset, because it is larger there; one of 80 mm does not.
 using InsetPicture = tests::Picture;
 TEST_F(InsetPicture, IsThereOnlyIfItIsNearer) {
   for (const double radius : {4e-3, 4e-2}) {

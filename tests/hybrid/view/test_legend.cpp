@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A soft object of several materials: the materials under its surface, its colours in the pixels, and the
-// rows of the legend.
+// A soft object of several materials: the material under each vertex of its surface, the colours of its
+// pixels, and the rows of the legend.
 #include "hybrid/view/legend.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ using tests::Session;
 using DrawnSceneOf = tests::SceneFile;
 using MaterialPicture = tests::Picture;
 
-// The soft ball alone; its half at x > 0 has one material, the rest another.
+// Only the soft ball. Its half at x > 0 is of fat, the other half of muscle.
 Session two_halves() {
   Session s = tests::shell_and_ball();
   s.scene.objects.erase(s.scene.objects.begin());
@@ -40,12 +40,12 @@ Session two_halves() {
 
 Camera from_the_front(const Session& s) {
   Camera camera = tests::framed(s);
-  camera.azimuth_rad = -0.5 * std::numbers::pi;  // x to the right
+  camera.azimuth_rad = -0.5 * std::numbers::pi;  // the x axis points to the right
   camera.elevation_rad = 0.0;
   return camera;
 }
 
-// Light scales a colour; its direction stays.
+// Distance between two colours, without their brightness: shading only scales a colour.
 float hue_apart(const glm::vec3& a, const glm::vec3& b) {
   return glm::length(glm::normalize(a) - glm::normalize(b));
 }
@@ -61,7 +61,7 @@ bool has(const std::vector<LegendRow>& rows, const std::string& name) {
   return std::ranges::find(all, name) != all.end();
 }
 
-// Like a composed body: 25 bones, and tissue of 14 materials.
+// As many objects as a composed body has: 25 bones, and tissue of 14 materials.
 Session body() {
   Session s = two_halves();
   DrawnObject tissue = s.scene.objects[0];
@@ -85,7 +85,7 @@ TEST(MaterialColours, AreUnlikeOneAnotherAndOnesOwnInAScene) {
       EXPECT_GT(glm::distance(colours[a], colours[b]), 0.15F) << a << " " << b;
   }
   for (std::size_t a = 10; a < 14; ++a) EXPECT_EQ(colours[a], hybrid::palette::other_material);
-  // The same material in a second object, and an object of a single material beside both.
+  // Adds an object with one of the same materials, and an object with a single material.
   s.scene.objects.push_back(s.scene.objects[25]);
   s.scene.objects.back().materials = {"skin", "organ 0"};
   s.scene.objects.push_back({"gel", true, tests::ball_mesh({0.0, 0.0, 0.0}, 0.01)});
@@ -114,7 +114,7 @@ TEST_F(DrawnSceneOf, HasTheMaterialBeneathEachVertex) {
   for (std::size_t v = 0; v < block.surface.vertices.size(); ++v) {
     const std::string& name = block.materials[block.vertex_material[v]];
     seen.insert(name);
-    // The nearest filled voxel must have the same material, away from the border between materials.
+    // Where all filled voxels around a vertex have one material, the vertex must have that material.
     const glm::dvec3 at = built.world->soft[0].to_body(block.surface.vertices[v]) / lattice.spacing_m();
     std::set<int> labels;
     for (int c = 0; c < 8; ++c) {
@@ -146,7 +146,8 @@ TEST_F(DrawnSceneOf, ThinnedTissueHasTheMaterialsItHad) {
   EXPECT_EQ(a.materials.size(), 2U);
   EXPECT_EQ(a.materials, b.materials);
   ASSERT_EQ(a.vertex_material.size(), b.vertex_material.size());
-  // At borders, voxels that thinning removed do not count for the majority.
+  // Borders between materials may differ, because a vertex takes the most frequent material around it and
+  // removed voxels no longer count.
   std::size_t same = 0;
   for (std::size_t v = 0; v < a.vertex_material.size(); ++v)
     same += a.vertex_material[v] == b.vertex_material[v] ? 1U : 0U;
@@ -192,7 +193,8 @@ TEST_F(MaterialPicture, OfOneMaterialIsAsItWas) {
   }
 }
 
-// From a small share of the scale on all tissues have the same colour; at a share of 0.04 they still differ.
+// With growing displacement the colour runs from the material's own colour to a ramp that is common to all
+// tissues. At 0.04 of the scale the materials still differ.
 TEST_F(MaterialPicture, RunsFromTheMaterialsOwnColourWithDisplacement) {
   Session s = two_halves();
   s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.12};
@@ -229,7 +231,7 @@ TEST(Legend, ListsMaterialsUnderTheirObject) {
     EXPECT_TRUE(rows[1 + m].within);
     EXPECT_EQ(rows[1 + m].swatch, std::vector<glm::vec3>{colours[m]});
   }
-  // Fat lies under a tool on the right.
+  // The tool moves to the right half, where it touches fat.
   s.now.proxy_m = {0.05, 0.0, 0.06};
   const auto touching = hybrid::legend_rows(s.scene, s.now, 20);
   EXPECT_FALSE(touching[1].touched);
@@ -241,7 +243,7 @@ TEST(Legend, CountsWhatDoesNotFit) {
   for (const std::size_t most : {1U, 5U, 6U, 8U, 12U, 17U, 60U}) {
     const auto rows = hybrid::legend_rows(s.scene, s.now, most);
     EXPECT_LE(rows.size(), std::max<std::size_t>(most, 5));
-    // Every material and every bone is in a row or in a count.
+    // Each material and each bone has its own row or is counted in one.
     std::size_t organs = 0, bones = 0, objects = 0;
     for (const LegendRow& row : rows) {
       const std::string& words = row.more.empty() ? row.name : row.more;
@@ -286,13 +288,14 @@ TEST(Legend, ListsAFewObjectsInTheirOrder) {
                                       "force on the hand"}));
 }
 
-// Wherever the tool is in the scene: it is dark; under the legend's plate it would be nearly white.
+// The legend hides the tool nowhere in the scene's view. The tool is dark; behind the legend's plate its
+// pixel would be nearly white.
 TEST_F(MaterialPicture, TheLegendLeavesTheSceneFree) {
   Session s = body();
   const Camera camera = from_the_front(s);
   s.now.force_N = {0.0, 0.0, 0.0};
   const hybrid::PixelRect& view = tests::small_layout.scene;
-  for (const bool moved : {false, true}) {  // moved: with the colour scale
+  for (const bool moved : {false, true}) {  // displaced tissue adds the colour scale to the legend
     if (moved)
       s.now.soft_moved_m[25].assign(s.scene.objects[25].surface.vertices.size(), {0.0F, 0.01F, 0.0F});
     for (const glm::dvec2& share : {glm::dvec2(0.06, 0.06), glm::dvec2(0.94, 0.06), glm::dvec2(0.06, 0.8),

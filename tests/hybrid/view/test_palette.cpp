@@ -19,7 +19,7 @@ glm::vec3 colour_of(const std::string& name, bool soft, const std::string& mater
   return hybrid::palette::of_object(scene, 0);
 }
 
-// Lightness in the sense of L*, from sRGB; CIE 1976.
+// Lightness L* (CIE 1976) of an sRGB colour.
 double lightness(const glm::vec3& colour) {
   const auto linear = [](double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); };
   const double y = 0.2126 * linear(colour.r) + 0.7152 * linear(colour.g) + 0.0722 * linear(colour.b);
@@ -62,7 +62,8 @@ TEST(CustomaryColours, LeaveTheOthersTheirOwn) {
   for (const std::size_t m : {0U, 2U}) EXPECT_GT(glm::distance(colours[m], colours[1]), 0.2F);
 }
 
-// One ramp: its lightness rises by equal steps, and from its first part on it is the same on any tissue.
+// The lightness of the ramp rises by equal steps. From a share of 0.15 on, the colour no longer depends on
+// the tissue.
 TEST(DisplacementRamp, IsPerceptualAndTheSameForAll) {
   const auto& ramp = hybrid::palette::moved;
   const double step = (lightness(ramp.back()) - lightness(ramp.front())) / 8.0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tests necessary properties of the pixels: the tool's colour at the tool, and tissue visible through bone.
+// Checks single pixels, for example that the tool has its colour and that tissue is visible through bone.
 // Without EGL, the cases that draw are skipped.
 #include "hybrid/view/picture.h"
 
@@ -51,7 +51,7 @@ TEST(CameraTest, ProjectsAndPicksBack) {
   ASSERT_TRUE(pixel.has_value());
   const glm::dvec3 back = camera.point_at(*pixel, 640, 480, point);
   EXPECT_NEAR(glm::length(back - point), 0.0, 1e-12);
-  // The same pixel by the matrix that the renderer uses.
+  // The renderer's matrix gives the same pixel.
   const glm::dvec4 clip = camera.clip_from_scene(640.0 / 480.0, {1.0, 2.0, 3.0}, camera.target_m, 0.3) *
                           glm::dvec4(point - glm::dvec3(1.0, 2.0, 3.0), 1.0);
   EXPECT_NEAR(320.0 * (1.0 + clip.x / clip.w), pixel->x, 1e-6);
@@ -150,10 +150,11 @@ TEST_F(Picture, ShowsToolTissueAndForceWhereTheyAre) {
   ASSERT_EQ(image.width, 960);
   ASSERT_EQ(image.height, 720);
   const auto pixel = [&](const glm::dvec3& at) { return tests::seen_at(camera, at); };
-  // The tool is dark, next to the device's ghost; the sampled point is on its upper side, toward the eye.
+  // The tool is dark, unlike the pale one at the device's position. The sampled point is on the tool's upper
+  // side, toward the eye.
   const glm::vec3 tool = image.at(pixel(s.now.proxy_m + camera.right() * 5e-3 + glm::dvec3(0.0, 0.0, 3e-3)));
   EXPECT_LT(tool.r + tool.g + tool.b, 1.2F);
-  // Half-way up, the arrow is blue.
+  // The force arrow is blue half-way up.
   const glm::dvec3 tip =
       s.now.proxy_m + glm::dvec3(0.0, 0.0, 8e-3 + 0.3 * camera.view_height_m() * 3.0 / 8.5);
   const glm::vec3 arrow = image.at(pixel(0.5 * (tip + s.now.proxy_m + glm::dvec3(0.0, 0.0, 8e-3))));
@@ -163,7 +164,7 @@ TEST_F(Picture, ShowsToolTissueAndForceWhereTheyAre) {
 }
 
 TEST_F(Picture, SeesThroughBoneThatHidesTissueAndOnlyThere) {
-  // A closed shell around the soft ball.
+  // Here the shell around the soft ball is closed.
   const Session closed = shell_and_ball({0.0, 0.0, 0.0}, 2.0);
   Camera camera = tests::framed(closed);
   camera.elevation_rad = 0.0;
@@ -189,7 +190,8 @@ TEST_F(Picture, ColoursDisplacement) {
   Camera camera = tests::framed(s);
   camera.elevation_rad = 0.9;
   DRAW_OR_SKIP(image, s, small(camera));
-  // 16 mm beside the tool's axis the tissue moved by 6 mm on a scale of 20; 45 mm beside it, hardly.
+  // 16 mm beside the tool's axis the tissue is displaced by 6 mm, where the colour scale ends at 20 mm. 45 mm
+  // beside the axis it is hardly displaced.
   const glm::dvec3 beside =
       camera.right() * 0.016 + glm::dvec3(0.0, 0.0, std::sqrt(0.0049 - 0.000256) - 0.0063);
   const glm::vec3 own = hybrid::palette::of_object(s.scene, 1);
@@ -201,13 +203,14 @@ TEST_F(Picture, ColoursDisplacement) {
   EXPECT_LT(like(beside, own), 0.95F);
 }
 
-// A bar that lies on a block, seen along their common faces: the bar is whole, whatever rounding says.
+// A bar has a face in the same plane as a block of tissue. The bar must be drawn whole, although rounding
+// could put either in front.
 TEST_F(Picture, DrawsABodyWholeOnTheTissueThatItLiesOn) {
   Session s;
   s.scene.tool_radius_m = 2e-3;
   s.scene.objects.push_back({"bar", false, polygon::make_box_mesh({0.01, 0.01, 0.005}, 8)});
   s.scene.objects.push_back({"block", true, polygon::make_box_mesh({0.03, 0.03, 0.015}, 16)});
-  // Its front face lies in that of the block, at y = −0.03.
+  // The front faces of bar and block are both at y = −0.03.
   for (glm::dvec3& v : s.scene.objects[0].surface.vertices) v += glm::dvec3(0.0, -0.02, 0.0);
   s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.1};
   s.now.feel.resize(2);
@@ -240,7 +243,7 @@ TEST_F(Picture, IsTheSameTwiceAndFarFromTheOrigin) {
   EXPECT_LT(sum / static_cast<double>(here.rgb.size()), 1.0);
 }
 
-// A bar on the left, turned and moved to the right.
+// A bar on the left is turned and moved to the right.
 TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
   for (const glm::dvec3& at : {glm::dvec3(0.0), glm::dvec3(1e6, -1e6, 1e6)}) {
     Session s;
@@ -260,7 +263,8 @@ TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
       return glm::length(colour - hybrid::palette::background) > 0.1F;
     };
     DRAW_OR_SKIP(rest, s, small(above));
-    // Turned by 90 degrees about its own centre and moved 100 mm to the right: its length is now along y.
+    // Turned by 90 degrees about its own centre and moved 100 mm to the right, the bar has its length along
+    // y.
     s.now.rigid_place = {{.moved = true,
                           .about_m = at + glm::dvec3(-0.05, 0.0, 0.0),
                           .shift_m = {0.1, 0.0, 0.0},
@@ -276,7 +280,7 @@ TEST_F(Picture, DrawsARigidObjectWhereItIsAtThatMoment) {
   }
 }
 
-// Far beyond everything at rest, it is still in the picture: not clipped and within the view.
+// An object that moves far from its start must stay within the view, and must not be clipped.
 TEST_F(Picture, FollowsARigidObjectThatLeaves) {
   Session s;
   s.scene.tool_radius_m = 2e-3;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cut through an object that hides a material: the inside of a built scene, when it is cut, and where.
+// The cut through an object that hides a material: what a built scene stores of its inside, and when and
+// where it is cut.
 #include "hybrid/view/section.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ using tests::Session;
 using InsideOf = tests::SceneFile;
 using CutPicture = tests::Picture;
 
-// A block of 20 mm of gel; its inner 10 mm are a core. The tool presses it from above.
+// A block of voxels of 20 mm: gel around a core of 10 mm. It has the surface of a ball, and a tool above it.
 Session cored() {
   Session s;
   s.scene.tool_radius_m = 3e-3;
@@ -46,7 +47,7 @@ Session cored() {
   s.now.force_N = {0.0, 0.0, 1.0};
   s.now.feel = {{true, 1.0}};
   s.now.inside.resize(1);
-  s.now.inside[0].used = true;  // without boxes: at rest
+  s.now.inside[0].used = true;  // no displacements: the block is at rest
   return s;
 }
 

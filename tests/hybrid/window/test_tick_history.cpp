@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The charts' history: a short spike is in the columns at any frame rate and any width.
+// The history behind the charts: a short spike appears in the columns at any frame rate and any width.
 #include "hybrid/window/tick_history.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ float most_in(const hybrid::TickHistory& history, ForceSeries series, std::size_
   return most;
 }
 
-// The servo side fills the ring; the window empties it once a frame.
+// The servo loop fills the ring, and the window empties it once a frame.
 TEST(TickHistory, ASpikeOfTwoTicksIsInTheColumnsAtAnyFrameRate) {
   for (const int ticks_a_frame : {1, 7, 16, 17, 100, 900}) {
     for (const std::size_t width : {std::size_t{1}, std::size_t{40}, std::size_t{333}, std::size_t{5000}}) {
@@ -42,7 +42,7 @@ TEST(TickHistory, ASpikeOfTwoTicksIsInTheColumnsAtAnyFrameRate) {
       while (ring.pop(taken)) history.add(taken);
       EXPECT_EQ(most_in(history, ForceSeries::total, width), 6.0F) << ticks_a_frame << ", " << width;
       EXPECT_EQ(most_in(history, ForceSeries::rigid, width), 3.0F);
-      // Elsewhere the columns are those without the spike.
+      // At most two columns show the spike.
       const auto columns = history.columns(ForceSeries::total, width);
       const auto high =
           std::count_if(columns.begin(), columns.end(), [](const auto& c) { return c && c->most_N > 1.0F; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scripts of a window: what each command does, and what is refused, with its line.
+// Scripts that control the window: what each command does, and which lines are refused.
 #include "hybrid/window/view_script.h"
 
 #include <gtest/gtest.h>

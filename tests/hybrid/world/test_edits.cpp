@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Edits: their ranges, and that what is felt afterwards is what a scene with that value gives.
+// Edits of a running session: their ranges, and that an edited value is felt like the same value in the scene
+// file.
 #include "hybrid/world/edits.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +17,7 @@ using hybrid::Edit;
 
 class Edits : public tests::SceneFile {
  protected:
-  // Slides over a rough plate with a relief, then presses a block of tissue.
+  // A scene whose tool slides over a rough plate with a relief and then presses a block of tissue.
   std::string scene(const std::string& tool, const std::string& feel) const {
     return "format = 1\n[device]\nmodel = \"ideal\"\n[safety]\nmax_force = 5\n[tool]\nradius = 2\n" + tool +
            tests::block +
@@ -56,8 +57,8 @@ TEST_F(Edits, BeforeTheFirstTickTheyGiveTheScenesThatSayTheSame) {
   EXPECT_NE(in_scene.state_hash, plain);
 }
 
-// A linear lattice of twice Young's modulus, pressed by a coupling of twice the stiffness, moves alike and
-// gives twice the force.
+// Twice Young's modulus and twice the stiffness of the coupling: the tool moves as before, and the force
+// doubles, as the lattice is linear.
 TEST_F(Edits, StifferTissueAndCouplingGiveForcesInProportion) {
   const hybrid::SessionResult one = felt(scene("stiffness = 300\n", ""));
   const hybrid::SessionResult two =
@@ -99,7 +100,8 @@ TEST_F(Edits, AreRefusedOutOfTheScenesRange) {
   EXPECT_EQ(hybrid::edited_value(*built.world, *built.state, 0, static_friction), 0.3);
 }
 
-// Every force of such an object would have to scale, not only that on the tool.
+// Young's modulus of such tissue cannot be edited, because forces on other bodies would have to change too,
+// not only that on the tool.
 TEST_F(Edits, TissueThatMeetsFreeBodiesOrTissueKeepsItsStiffness) {
   const std::string free =
       "[[rigid]]\nname = \"weight\"\nprimitive = \"ball\"\nradius = 4\nposition = [0, 0, "

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Free bodies against closed forms, and at the extremes of mass, stiffness and step.
+// Compares free bodies with closed forms, and tests extreme masses, stiffnesses and time steps.
 #include "hybrid/world/free_body.h"
 
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ TEST(FreeBody, FallsAsSemiImplicitEulerFalls) {
   for (int n = 0; n < ticks; ++n) ASSERT_TRUE(step_free_body(body, state, {}, dt));
   const double t = ticks * dt;
   EXPECT_NEAR(state.velocity_m_per_s.z, -9.81 * t, 1e-12);
-  // The step's own solution, g t (t + dt)/2, is within g t dt/2 of the exact solution.
+  // The time step gives g t (t + dt)/2, which differs from the exact solution by g t dt/2.
   EXPECT_NEAR(state.centre_m.z, -0.5 * 9.81 * t * (t + dt), 1e-12);
   EXPECT_EQ(state.rotation, dquat(1.0, 0.0, 0.0, 0.0));
 }
@@ -61,9 +61,9 @@ TEST(FreeBody, DragSlowsItExponentially) {
   const double kept = std::exp(-0.5 / 0.25);
   EXPECT_NEAR(glm::length(state.velocity_m_per_s - kept * dvec3(0.3, -0.1, 0.2)), 0.0, 1e-3 * kept);
   EXPECT_NEAR(state.spin_rad_per_s.y, 5.0 * std::exp(-0.5 / 0.125), 5e-3 * 5.0 * std::exp(-4.0));
-  // Its travel is v₀ m/c (1 − kept), to the order of the step.
+  // The distance is v₀ m/c (1 − kept), up to an error of the order of the step.
   EXPECT_NEAR(state.centre_m.x, 0.3 * 0.25 * (1.0 - kept), 1e-4);
-  // With any drag, it stops and does not reverse.
+  // Even with very large drag, the body does not reverse.
   body.drag_N_s_per_m = 1e6;
   const double before = state.velocity_m_per_s.x;
   ASSERT_TRUE(step_free_body(body, state, {}, 0.01));
@@ -71,8 +71,8 @@ TEST(FreeBody, DragSlowsItExponentially) {
   EXPECT_LT(state.velocity_m_per_s.x, 1e-4 * before);
 }
 
-// A push through the centre causes no rotation; a push beside it causes rotation by its lever. A step
-// transfers the full momentum, however light the body.
+// A push through the centre causes no rotation; any other push causes one in proportion to its lever arm. A
+// step transfers the full momentum, however light the body is.
 TEST(FreeBody, TakesTheMomentumOfWhatPushesIt) {
   std::mt19937_64 random(4);
   for (int n = 0; n < 1000; ++n) {
@@ -96,8 +96,8 @@ TEST(FreeBody, TakesTheMomentumOfWhatPushesIt) {
   }
 }
 
-// Torque-free: momentum and energy stay constant to rounding over 20 s, for every shape, also about the
-// unstable axis.
+// Without torque, momentum and energy stay constant to rounding over 20 s, for every shape, also when it
+// turns about its unstable axis.
 TEST(FreeBody, TurnsByItselfWithoutLossOrGain) {
   const std::array<dvec3, 4> shapes{dvec3(0.01, 0.02, 0.05), dvec3(0.05, 0.05, 0.001),
                                     dvec3(0.001, 0.001, 0.1), dvec3(0.03)};
@@ -136,7 +136,7 @@ TEST(FreeBody, PrecessesAtTheRateOfTheTop) {
   EXPECT_LE(glm::distance(state.rotation * axis, expected), 1e-5);
 }
 
-// Springs that press on a body: at fixed points of the scene, one-sided, against the body's corners.
+// A springy floor that pushes each corner of a body which is below it, and never pulls.
 struct Springs {
   dvec3 half_size{0.005};
   double floor_m = 0.0;  // z
@@ -158,15 +158,15 @@ struct Springs {
   }
 };
 
-// 0.1 g on 25 kN/m: a resonance of 2.5 kHz, far above what a step can resolve. For a push through the centre
-// of mass energy never grows, not even by rounding.
+// A body of 0.1 g on 25 kN/m has a resonance of 2.5 kHz, far above what a step can resolve. The contacts push
+// through the centre of mass, so energy must never grow beyond rounding.
 TEST(FreeBody, StiffContactsNeverGiveALightBodyEnergy) {
   std::mt19937_64 random(8);
   const FreeBody body = box_body(dvec3(0.01), 1e-4);
   for (const double dt : {1e-4, 1e-3, 1e-2}) {
     for (const double k : {2.5, 25.0, 2.5e3, 25e3, 1e7}) {
       for (int start = 0; start < 40; ++start) {
-        // Between walls on three sides that overlap: the body is always in contact with at least one.
+        // Three springy walls around the body overlap, so that it always touches at least one.
         const std::array<dvec3, 3> walls{dvec3(1, 0, 0), glm::normalize(dvec3(-1, 1, 0.2)),
                                          glm::normalize(dvec3(-0.2, -1, -1))};
         FreeBodyState state;
@@ -227,14 +227,14 @@ TEST(FreeBody, StiffContactsAtCornersNeverMakeALightBodyFly) {
           worst = std::max(worst, total() / first);
         }
       }
-      // Four hundred times the stiffness of a rigid contact, at ten times the longest usual step: the error
-      // of the arc shows.
+      // Only at four hundred times the stiffness of a rigid contact does the error of the arc show.
       EXPECT_LE(worst, stiffness > 25e3 ? 1.03 : 1.0) << "dt " << dt << ", k " << stiffness;
     }
   }
 }
 
-// Between springs on both sides it comes to rest in their middle, at any step.
+// On a springy contact, under gravity, it comes to rest at the depth where both forces balance, for any time
+// step.
 TEST(FreeBody, RestsWhereForcesBalance) {
   for (const double dt : {1e-4, 1e-3, 1e-2}) {
     const FreeBody body = [] {
@@ -256,12 +256,12 @@ TEST(FreeBody, RestsWhereForcesBalance) {
   }
 }
 
-// Contacts push and never pull: a contact that the body leaves gives no force against the motion.
+// Contacts push and never pull: a contact does not slow down a body that leaves it.
 TEST(FreeBody, ContactsLetGo) {
   const FreeBody body = box_body(dvec3(0.01), 1e-3);
   FreeBodyState state;
   state.velocity_m_per_s = {0.0, 0.0, 1.0};
-  const BodyContact contact{{0, 0, -0.005}, {0, 0, 1}, 1e-3, 25e3};  // 40 nm deep, left at 1 m/s
+  const BodyContact contact{{0, 0, -0.005}, {0, 0, 1}, 1e-3, 25e3};  // 40 nm deep
   ASSERT_TRUE(step_free_body(body, state, std::span(&contact, 1), 1e-3));
   EXPECT_NEAR(state.velocity_m_per_s.z, 1.0, 1e-9);
   // The same contact stops a body that approaches.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pose of a rigid object at a time, its travel, and its path from scene file to world.
+// The pose of a rigid object at a given time, how far it travels, and how its motion gets from the scene file
+// into the world.
 #include "hybrid/world/rigid_motion.h"
 
 #include <gtest/gtest.h>
@@ -93,7 +94,7 @@ TEST(RigidMotion, TurnsAboutItsAxis) {
     const Pose pose = motion.pose_at(t);
     const dquat turn = glm::angleAxis(std::fmod(rate * t, glm::two_pi<double>()), axis);
     expect_pose(pose, {about + turn * (kStart.position_m - about), turn * kStart.rotation}, 1e-9);
-    // The distance to every point of the axis is constant.
+    // The object keeps its distance to every point of the axis.
     for (const double s : {-0.5, 0.0, 0.5}) {
       EXPECT_NEAR(glm::distance(pose.position_m, about + s * axis),
                   glm::distance(kStart.position_m, about + s * axis), 1e-12);
@@ -144,7 +145,8 @@ TEST(RigidMotion, OfAFreeBodyHasItsMass) {
   const RigidMotion said = moving(free_motion(0.5, {}, dvec3(1e-3, 2e-3, 2.5e-3), dvec3(0.01, 0, 0)), kStart);
   EXPECT_EQ(said.free_body().mass.inertia_kg_m2[1][1], 2e-3);
   EXPECT_EQ(said.free_body().mass.centre_m.x, 0.01);
-  // The computed inertia about another centre grows by m d² across the shift, and by nothing along it.
+  // With a centre of mass shifted by d, the computed inertia grows by m d² about axes across the shift, and
+  // not about the axis along it.
   const RigidMotion shifted = moving(free_motion(0.5, {}, {}, dvec3(0.01, 0, 0)), kStart);
   EXPECT_NEAR(shifted.free_body().mass.inertia_kg_m2[0][0], inertia[0][0], 1e-15);
   EXPECT_NEAR(shifted.free_body().mass.inertia_kg_m2[1][1], inertia[1][1] + 0.5 * 1e-4, 1e-15);
@@ -225,7 +227,7 @@ TEST_F(MotionScene, BuildsIntoTheWorldAndTheMap) {
   EXPECT_EQ(map.rigid_in(at_x - half, at_x + half), 1U);
 }
 
-// The exact surfaces of curved primitives are slightly outside their triangles.
+// The exact surface of a curved primitive is slightly outside its triangles, and the map must cover it too.
 TEST_F(MotionScene, TheMapCoversCurvedPrimitives) {
   const std::string shapes =
       "format = 1\n[path]\nkind = \"press\"\nfrom = [0, 0, 90]\nto = [0, 0, 80]\n[occupancy]\ncell = 0.2\n"

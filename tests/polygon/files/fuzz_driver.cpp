@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes files: PROGRAM --seconds N --seed S [--keep DIR] [--only .EXT] [FILE…]. Which ones, fuzz_seeds() and
-// fuzz_file() say, which each fuzzer has its own of. Named files are tried unchanged, and nothing else is
-// done. Otherwise inputs are mutated in batches, each in its own process. An input that
-// crashes, violates an invariant or takes too long is written to DIR, and the next batch continues. An input
-// with new behaviour (other findings, another error) joins the pool and is mutated further. The same seed
-// makes the same inputs. Build with sanitizers (preset asan), because memory errors show only there.
+// Fuzzes mesh files: fuzz_mesh --seconds N --seed S [--keep DIR] [FILE…]. If files are named, they are tried
+// unchanged, and nothing else is done. Otherwise inputs are mutated in batches, each batch in its own
+// process. An input that crashes, violates an invariant or takes too long is written to DIR, and the next
+// batch continues. An input with new behaviour (other findings, another error) joins the pool and is mutated
+// further. The same seed makes the same inputs. Build it with sanitizers (preset asan), because other builds
+// do not show memory errors.
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -33,22 +33,22 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr unsigned kLimit_s = 60;      // for one input, sanitizers included
+constexpr unsigned kLimit_s = 60;      // time for one input, including the cost of sanitizers
 constexpr unsigned kBatch = 500;       // inputs per process
 constexpr std::size_t kMaxPool = 400;  // inputs kept for further mutation
 constexpr std::size_t kSlots = 1U << 16U;
 
-// Shared between the processes, so that it survives a crash.
+// State shared between the processes, so that it survives a crash.
 struct Shared {
   std::uint64_t executions = 0, loaded = 0;
   double slowest_s = 0.0;
   std::uint64_t slowest_bytes = 0, slowest_size = 0;
   std::uint64_t signatures = 0;
-  char name[512] = {};  // of the current input
+  char name[512] = {};  // name of the current input
   bool seen[kSlots] = {};
 };
 
-// CPU time of this process, so that a busy machine does not count as slow.
+// CPU time of this process. Unlike elapsed time, it does not depend on other processes.
 double processor_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
@@ -95,7 +95,7 @@ struct Fuzzer {
     }
   }
 
-  // Takes the last batch's new inputs into the pool. They replace the oldest ones that are not seeds.
+  // Takes the last batch's new inputs into the pool. They replace the oldest inputs that are not seeds.
   void take_new(std::size_t seeds, std::mt19937_64& random) {
     std::vector<std::filesystem::path> found;
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -146,7 +146,7 @@ int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep, 
         fuzzer.try_one(batch == 0 && i < seeds ? fuzzer.pool[i] : tests::mutated(base, other, random),
                        random);
       }
-      std::_Exit(0);  // leak checks and destructors run once, at the end of the parent
+      std::_Exit(0);  // without leak checks and destructors; only the parent runs them
     }
     int status = 0;
     ::waitpid(child, &status, 0);

@@ -130,7 +130,7 @@ std::vector<TriangleMesh> small_meshes() {
   TriangleMesh crossing = make_box_mesh(glm::dvec3(0.5), 1);
   append(crossing, make_box_mesh(glm::dvec3(0.5), 1), {0.3, 0.2, 0.1});
   meshes.push_back(crossing);
-  TriangleMesh soup;  // separate triangles: one missing, one repeated, one turned over
+  TriangleMesh soup;  // separate triangles of a closed mesh: one missing, one repeated, one turned over
   const TriangleMesh ball = make_ball_mesh(1.0, 1);
   for (std::size_t i = 1; i < ball.triangles.size(); ++i) {
     const TriangleIndices& t = ball.triangles[i];

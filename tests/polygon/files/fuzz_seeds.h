@@ -10,13 +10,13 @@ namespace tests {
 
 struct FuzzInput {
   std::string bytes;      // not packed
-  std::string extension;  // ".ply"; packed on writing when `packed`
+  std::string extension;  // e.g. ".ply"; if `packed`, the file is packed when written
   bool packed = false;
 };
 
 std::vector<FuzzInput> fuzz_seeds();
 
-// Applies one or a few changes, determined by the random state. Pieces are taken from `other`.
+// Applies one or a few changes, chosen by `random`. Some changes insert pieces of `other`.
 FuzzInput mutated(FuzzInput input, const FuzzInput& other, std::mt19937_64& random);
 
 // The bytes packed with gzip.

@@ -22,10 +22,11 @@ namespace {
 
 using namespace polygon;
 
-// Limit on the unpacked size: enough for every seed, and small enough to stop a file that lies about its
-// size.
+// Limit on the unpacked size: enough for every seed, but small enough that a file with a false size is
+// refused.
 constexpr std::uint64_t kMaxBytes = 4U << 20U;
-// Of the box's diagonal; a triangle further than this from the repaired mesh is lost.
+// Fraction of the bounding box's diagonal. A triangle further than this from the repaired mesh counts as
+// lost.
 constexpr double kLost = 1e-5;
 
 void must(bool holds, const char* what) {
@@ -95,7 +96,7 @@ void touch(const TriangleMesh& mesh, bool solid) {
   }
 }
 
-// Repair may drop degenerate triangles and those that another triangle covers, and no others.
+// Checks that repair keeps every triangle that is not degenerate and not covered by another triangle.
 void must_keep(const TriangleMesh& before, const TriangleMesh& after) {
   const Box box = box_of(before);
   const double lost = kLost * glm::length(box.high - box.low);
@@ -127,7 +128,7 @@ FuzzOutcome fuzz_file(const std::filesystem::path& file) {
     must(words.starts_with(file.string()), "a refusal names the file");
     for (const char c : words.substr(file.string().size())) {
       const bool letter = std::isalpha(static_cast<unsigned char>(c)) != 0;
-      // Further on it quotes the file.
+      // Only the first letters count, because later ones quote the file.
       if (letter && outcome.signature.size() < 40) outcome.signature += c;
     }
     return outcome;
@@ -151,8 +152,8 @@ FuzzOutcome fuzz_file(const std::filesystem::path& file) {
   add(outcome.signature, after.findings);
   const bool doubled = std::any_of(before.findings.begin(), before.findings.end(),
                                    [](const Finding& f) { return f.id.starts_with("M03"); });
-  // If a sheet has a face on either side, only one is kept: a mesh that was closed by counting edges becomes
-  // a sheet.
+  // If a sheet has two coincident faces, one for either side, repair keeps only one. The mesh was closed by
+  // its edge counts and becomes an open sheet.
   must(after.closed || !before.closed || doubled, "repair opens no closed mesh");
   touch(repaired.mesh, after.oriented);
   return outcome;

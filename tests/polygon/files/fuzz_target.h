@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fuzzer does with every file. That of meshes: load, check, repair, check again, touch. It aborts if
-// an invariant is violated.
+// The steps that the fuzzers do with every file: load, check, touch, repair, check and touch again.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +12,7 @@ struct FuzzOutcome {
   bool loaded = false;   // false: refused in words
   std::size_t size = 0;  // as loaded: triangles of a mesh, entries of another file
   // Summary of the behaviour: ids of findings and repairs, or the error text without its numbers. Two inputs
-  // with the same signature test much the same.
+  // with the same signature test similar code.
   std::string signature;
 };
 

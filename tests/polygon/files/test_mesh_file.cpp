@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reading and writing of mesh files: every format, everything that is left out or refused, and the data sets.
+// Reading and writing of mesh files: every format, each kind of element that is left out, each kind of file
+// that is refused, and the data sets.
 #include "polygon/files/mesh_file.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +20,7 @@ namespace {
 
 using namespace polygon;
 
-// A folder for the files of one test, removed with it.
+// A folder for the files of one test, removed at the test's end.
 class MeshFiles : public testing::Test {
  protected:
   void SetUp() override {
@@ -87,7 +88,7 @@ constexpr const char* kTetrahedronStl =
     "facet normal -1 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\nendloop\nendfacet\nendsolid "
     "t\n";
 
-// Accepts any order of vertices, because formats differ.
+// Accepts any order of vertices, because it differs between formats.
 void expect_tetrahedron(const MeshFile& file, double scale = 1.0) {
   ASSERT_EQ(file.mesh.vertices.size(), 4U);
   ASSERT_EQ(file.mesh.triangles.size(), 4U);
@@ -319,7 +320,7 @@ TEST_F(MeshFiles, WrittenFormatsAreReadAgainInTheirUnit) {
     void (*write)(const TriangleMesh&, const ByteSink&);
     double unit_m, error_m;
   };
-  // STL has floats, of which OpenMesh welds equal ones.
+  // STL has floats, and OpenMesh welds equal corners.
   for (const Written& w :
        {Written{"a.ply", write_ply, 1.0, 0.0}, Written{"a.stl", write_stl_in_mm, 1e-3, 1e-9},
         Written{"a.obj", write_obj_in_mm, 1e-3, 1e-17}}) {
@@ -348,7 +349,7 @@ TEST_F(MeshFiles, AMeshThatIsNotFinishedLeavesWhatWasThere) {
       std::distance(std::filesystem::directory_iterator(folder_), std::filesystem::directory_iterator()), 1);
 }
 
-// The expected counts are those of the data sets' own list, made by another program.
+// The expected counts are from the data sets' own list, which another program made.
 TEST(SharedMeshes, LoadWithTheirDocumentedCounts) {
   const auto folder = tests::shared_data("data");
   SKIP_WITHOUT(folder);

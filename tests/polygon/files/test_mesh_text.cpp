@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mesh files as programs write them: byte-order marks, line ends, what stands in place of a mesh, and faces
+// Mesh files as programs write them: byte-order marks, line ends, other files in place of a mesh, and faces
 // of more than three corners.
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -94,7 +94,7 @@ TEST_F(MeshText, LinesKeepTheirNumbers) {
   EXPECT_NE(refused("a.obj", "\xEF\xBB\xBFv 0 0 0\rv 1 0 0\rv 0 x 0\r").find("line 3"), std::string::npos);
 }
 
-// A binary body may begin with the byte of a line feed.
+// A binary body may begin with a byte that equals a line feed.
 TEST_F(MeshText, TheBodyOfABinaryPlyIsLeftAsItIs) {
   const std::string body = [] {
     std::string bytes(1, '\n');
@@ -130,7 +130,8 @@ TEST_F(MeshText, WhatStandsInPlaceOfAMeshIsToldForWhatItIs) {
     EXPECT_NE(refused(name, std::string("\xFF\xFEv\0 \0", 6)).find("UTF-16"), std::string::npos) << name;
 }
 
-// A prism over an L: 700 square units high 10. Each face begins at `turn`.
+// A prism of height 10 over an L-shaped base of 700 square units. Each face's list of corners begins at
+// `turn`.
 std::string l_prism(std::size_t turn, const std::string& format) {
   const std::vector<std::array<int, 2>> corners{{40, 0}, {40, 10}, {10, 10}, {10, 40}, {0, 40}, {0, 0}};
   std::vector<std::vector<std::size_t>> faces{{5, 4, 3, 2, 1, 0}, {6, 7, 8, 9, 10, 11}};

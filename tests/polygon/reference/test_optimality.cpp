@@ -30,7 +30,7 @@ void add_quad(TriangleMesh& mesh, const dvec3& a, const dvec3& b, const dvec3& c
   mesh.triangles.push_back({base, base + 2, base + 3});
 }
 
-// Three quarter planes that face one another: x = 0, y = 0 and z = 0.
+// Three quarter planes that form a concave corner: x = 0, y = 0 and z = 0.
 TriangleMesh concave_corner() {
   TriangleMesh mesh;
   const dvec3 o(0.0), x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
@@ -51,11 +51,11 @@ class OptimalityPlaced : public testing::TestWithParam<Placement> {
   [[nodiscard]] TriangleMesh at(const TriangleMesh& mesh) const {
     return moved(mesh, GetParam().scale, GetParam().offset);
   }
-  // Error due to the skin and the size of the coordinates, for a mesh of size about 2.
+  // Error due to the skin and to rounding at these coordinates, for a mesh of size about 2.
   [[nodiscard]] double tolerance() const {
     return 1e-8 * GetParam().scale + 1e-12 * glm::length(GetParam().offset);
   }
-  // The error is 0 at the optimum, and beside it equals the displacement.
+  // Expects an error of 0 at the optimum. Beside the optimum the error has to equal the displacement.
   void expect_optimum(const OptimalityReference& reference, const dvec3& goal, const dvec3& optimum,
                       const dvec3& aside, double radius) const {
     const double s = GetParam().scale;
@@ -93,14 +93,15 @@ TEST_P(OptimalityPlaced, BallAndPointOnBothSidesOfASheet) {
 TEST_P(OptimalityPlaced, EdgeAndCornerOfACube) {
   const OptimalityReference reference(at(make_box_mesh(dvec3(0.5), 3)));
   const double radius = 0.05;
-  // Outside: the edge and the corner are nearest, and the ball rests against them.
+  // The goal is outside the cube. The edge or the corner is nearest to it, and the ball rests there.
   const dvec3 goal(0.51, 0.13, 0.51);
   const dvec3 on_edge = dvec3(0.5, 0.13, 0.5) + radius * glm::normalize(dvec3(1, 0, 1));
   expect_optimum(reference, goal, on_edge, dvec3(0, 1, 0), radius);
   expect_optimum(reference, goal, on_edge, glm::normalize(dvec3(1, 0, 1)), radius);
   const dvec3 at_corner = dvec3(0.5) + radius * glm::normalize(dvec3(1));
   expect_optimum(reference, dvec3(0.51), at_corner, glm::normalize(dvec3(1)), radius);
-  // Inside: the point above the edge is stationary too, although the balance is unstable.
+  // The goal is inside the cube. The point above the edge is stationary too, although its balance is
+  // unstable.
   expect_optimum(reference, dvec3(0.4, 0.13, 0.4), on_edge, dvec3(0, 1, 0), radius);
   expect_optimum(reference, dvec3(0.3, 0.13, 0.2), dvec3(0.3, 0.13, 0.55), dvec3(1, 0, 0), radius);
 }
@@ -112,7 +113,7 @@ TEST_P(OptimalityPlaced, ConcaveCornerOfTwoAndThreePlanes) {
     expect_optimum(reference, dvec3(-0.1, 0.37, -0.07), dvec3(r, 0.37, r), dvec3(0, 1, 0), radius);
     expect_optimum(reference, dvec3(-0.1, 0.37, -0.07), dvec3(r, 0.37, r), dvec3(1, 0, 0), radius);
     expect_optimum(reference, dvec3(-0.1, -0.03, -0.07), dvec3(r), glm::normalize(dvec3(1, 2, 3)), radius);
-    // Along the mesh's own edges.
+    // The goal lies on the diagonal, where the mesh has edges.
     expect_optimum(reference, dvec3(-0.1), dvec3(r), dvec3(0, 1, 0), radius);
     expect_optimum(reference, dvec3(-0.1, 0.37, 0.37), dvec3(r, 0.37, 0.37), dvec3(0, 1, 0), radius);
   }
@@ -125,7 +126,7 @@ TEST_P(OptimalityPlaced, PointAndBallOnAFacetedSphere) {
   const double s = GetParam().scale;
   for (int i = 0; i < 60; ++i) {
     const dvec3 goal = 0.9 * tests::random_unit(random);
-    // The nearest face: the least of the distances to the planes.
+    // The nearest face is that with the least distance to its plane.
     double least = 2.0;
     dvec3 out(0.0);
     for (const TriangleIndices& t : mesh.triangles) {
@@ -143,7 +144,7 @@ TEST_P(OptimalityPlaced, PointAndBallOnAFacetedSphere) {
       EXPECT_LT(glm::length(reference.convex_optimum(at(goal), radius * s) - at(optimum)),
                 tolerance() + 2e-8 * s);
       for (const double away : {0.0, 1e-6, 1e-5, 1e-4}) {
-        // Edges and corners have stationary points of their own, so the error may be smaller.
+        // There are other stationary points at edges and corners, so the error may be smaller.
         const NearestOptimum found =
             reference.nearest_optimum(at(goal), at(optimum + away * aside), radius * s, 0.1 * s);
         ASSERT_TRUE(found.found);
@@ -163,7 +164,7 @@ TEST(Optimality, FreeProxyBelongsAtTheGoal) {
   EXPECT_TRUE(there.found);
   EXPECT_EQ(there.error_m, 0.0);
   EXPECT_NEAR(there.clearance_m, 0.35, 1e-15);
-  // At any distance, because nothing is in the way.
+  // The goal is found at any distance, because nothing is in the way.
   const NearestOptimum far = reference.nearest_optimum(goal, dvec3(0.9, -3, 0.2), 0.05, 1e-3);
   EXPECT_TRUE(far.found);
   EXPECT_NEAR(far.error_m, 3.1, 1e-15);
@@ -182,7 +183,8 @@ TEST(Optimality, AProxyTooFarOffIsNotFoundButHasAtLeastThatError) {
 }
 
 TEST(Optimality, OptimaAcrossASheetDoNotCountAndThoseAroundAnEdgeDo) {
-  // The goal pulls up from below, and the point is on top: the optimum below is 20 nm away but not reachable.
+  // The goal is above the sheet. A point below it has an optimum at the sheet. A point 10 nm above it has
+  // not: that optimum is 10 to 20 nm away but across the sheet.
   const OptimalityReference sheet(make_plane_mesh(1.0, 1));
   const NearestOptimum across = sheet.nearest_optimum({0.1, 0.2, 0.3}, {0.1, 0.2, 1e-8}, 0.0, 1e-3);
   ASSERT_TRUE(across.found);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The reference on rough surfaces, against optima that are found by other means: the local minima over a
-// terrain, an augmented Lagrangian, and random small steps.
+// The reference on rough surfaces, against optima found by other methods: local minima over a terrain, an
+// augmented Lagrangian, and random small steps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,9 +19,9 @@ namespace {
 using namespace polygon;
 using glm::dvec3;
 
-// A terrain with a goal below it. A point is held at local minima of the distance over the surface: on a face
-// straight above or below the goal, in a valley, in a pit. They are found by derivatives along the surface,
-// without any skin.
+// A terrain with a goal below it. The optima of a point proxy are the local minima of the distance over the
+// surface: on a face straight above the goal, in a valley or in a pit. They are found by slopes along the
+// surface, without a skin.
 class Terrain {
  public:
   explicit Terrain(std::uint64_t seed) {
@@ -41,7 +41,7 @@ class Terrain {
     }
   }
 
-  // Local minima of |q − goal| over the surface, away from its rim.
+  // Local minima q of |q − goal| over the surface, away from its rim.
   [[nodiscard]] std::vector<dvec3> minima(const dvec3& goal) const {
     std::vector<dvec3> found;
     const auto consider = [&](const dvec3& q) {
@@ -50,8 +50,8 @@ class Terrain {
         if (glm::length(other - q) < 1e-9) return;
       }
       const double here = glm::length(q - goal);
-      // The distance is convex over each triangle. So its slope from q is least towards the triangle's own
-      // nearest point.
+      // The distance is convex over each triangle. So q is a minimum over a triangle if no point of the
+      // triangle is nearer to the goal.
       for (const TriangleIndices& t : mesh.triangles) {
         if (tests::triangle_distance(q, mesh, static_cast<std::size_t>(&t - mesh.triangles.data())) > 1e-12) {
           continue;
@@ -95,7 +95,7 @@ TEST(Optimality, PointsInTheValleysAndPitsOfATerrain) {
       for (const dvec3& optimum : terrain.minima(goal)) {
         ++total;
         for (const dvec3& v : terrain.mesh.vertices) pits += v == optimum ? 1 : 0;
-        // The direction that leaves all adjacent faces fastest.
+        // A direction out of the surface that rises from all adjacent faces.
         dvec3 out(0.0);
         for (int n = 0; n < 50; ++n) {
           for (std::size_t t = 0; t < terrain.mesh.triangles.size(); ++t) {
@@ -120,16 +120,17 @@ TEST(Optimality, PointsInTheValleysAndPitsOfATerrain) {
 }
 
 // Augmented Lagrangian (Nocedal & Wright, Numerical Optimization, 17.3) with plain gradient steps. It is
-// slow, and it uses nothing but the distances of triangles.
+// slow, and it uses only the distances of triangles.
 struct Descent {
   dvec3 point{0.0};
-  double residual = 0.0;  // of the balance of forces
+  double residual = 0.0;  // largest residual of the balance of forces
   double depth = 0.0;     // largest penetration
 };
 
 Descent descend(const TriangleMesh& mesh, const dvec3& goal, const dvec3& start, double radius) {
   const auto closest = [&](const dvec3& q, std::size_t t) {
-    // The closest point by projection, because central differences of the distance would be inaccurate.
+    // Computes the closest point by projection, because central differences of the distance would be
+    // inaccurate.
     const TriangleIndices& f = mesh.triangles[t];
     const dvec3 &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
     dvec3 w(1.0 / 3.0);
@@ -200,7 +201,7 @@ TEST(Optimality, WhereASlowDescentEndsInARoughMesh) {
   EXPECT_GE(ended, 10);
 }
 
-// Each result is feasible, and none of many random small steps that stay feasible brings the goal nearer.
+// Each result is feasible, and many random small steps that stay feasible do not come nearer to the goal.
 TEST(Optimality, NothingNearbyIsBetterThanWhatIsFound) {
   int found_some = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
@@ -219,7 +220,7 @@ TEST(Optimality, NothingNearbyIsBetterThanWhatIsFound) {
     for (int i = 0; i < 400; ++i) {
       const dvec3 there = found.point + kStep * tests::random_unit(random);
       if (tests::mesh_distance(there, terrain.mesh) < radius) continue;
-      // The gain of a feasible step is of second order, also on curved surfaces.
+      // At an optimum a feasible step gains at most a second-order amount, also on curved surfaces.
       EXPECT_GT(glm::length(there - goal), here - 20.0 * kStep * kStep / radius * (1.0 + here)) << seed;
     }
   }

@@ -94,7 +94,7 @@ TEST(CheckMesh, EachDefectIsCountedAndPlaced) {
   }
 }
 
-// Each defect is reported where it was made.
+// Each defect is reported at its place.
 TEST(CheckMesh, PlacesAreWhereTheDefectsAre) {
   const TriangleMesh ball = make_ball_mesh(1.0, 3);
   const auto middle = [&](std::size_t i) {
@@ -111,7 +111,7 @@ TEST(CheckMesh, PlacesAreWhereTheDefectsAre) {
   EXPECT_LT(glm::length(duplicate->place->first_m - middle(77)), 1e-15);
   EXPECT_EQ(tests::find_finding(findings, "M01")->place->triangle, ball.triangles.size() + 1);
 
-  TriangleMesh holed = ball;  // two holes; the reported place is that of the larger one
+  TriangleMesh holed = ball;  // two holes; the larger hole is the reported place
   const auto [a, b, c] = ball.triangles[100];
   std::erase_if(holed.triangles, [&, corner = a](const TriangleIndices& t) {
     return t[0] == corner || t[1] == corner || t[2] == corner || t == ball.triangles[500];
@@ -194,10 +194,10 @@ struct Documented {
   bool closed, consistent;
   std::size_t boundary_edges, nonmanifold_edges, doubly_directed, pieces, duplicates, coincident,
       intersections;
-  double volume;  // signed; compared if closed and consistent
+  double volume;  // signed; compared only for a closed, consistently oriented mesh
 };
 
-// From the data sets' own list, made by another program with exact predicates.
+// Values from the data sets' own list, which another program made with exact predicates.
 const std::vector<Documented>& documented() {
   static const std::vector<Documented> list{
       {"meshes/adis16480_cad.stl.gz", true, true, 0, 0, 0, 1, 0, 0, 0, 2.819e-05},

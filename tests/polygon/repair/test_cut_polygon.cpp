@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Polygons of every shape are covered by triangles, and nothing beside them is: the areas of the triangles
-// add up to that of the polygon, and all have its direction.
+// Polygons of every shape are covered exactly by triangles. So the triangles' areas add up to the area of the
+// polygon, and all triangles have its direction.
 #include "polygon/repair/cut_polygon.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ const Ring& notched() {
   return ring;
 }
 
-// Teeth of width 1 and height 5 with gaps of 1 between them, on a bar of height 1.
+// Teeth of width 1 and height 5, with gaps of width 1 between them, on a bar of height 1.
 Ring comb(int teeth) {
   Ring ring{{0.0, -1.0, 0.0}, {2.0 * teeth - 1.0, -1.0, 0.0}};
   for (int i = teeth; i-- > 0;) {
@@ -59,7 +59,7 @@ Ring spiral(int corners) {
   return ring;
 }
 
-// A square with a square hole, to which a cut leads that the polygon runs along twice.
+// A square with a square hole. A cut connects the hole to the outline, and the polygon runs along it twice.
 Ring keyhole() {
   return flat({{0, 0}, {6, 0}, {6, 6}, {0, 6}, {0, 0}, {2, 2}, {2, 4}, {4, 4}, {4, 2}, {2, 2}});
 }
@@ -74,8 +74,8 @@ glm::dvec3 newell(const Ring& ring) {
 struct Covered {
   PolygonCut cut;
   std::size_t triangles = 0;
-  double area = 0.0;     // of all triangles, along the polygon's normal
-  double least = 1e300;  // of one
+  double area = 0.0;     // sum over the triangles, along the polygon's normal
+  double least = 1e300;  // least area of a triangle
 };
 
 Covered cover(const Ring& ring) {
@@ -102,7 +102,8 @@ void expect_covered(const Ring& ring, const char* what) {
   EXPECT_EQ(covered.triangles, ring.size() - 2) << what;
 }
 
-// Turned and moved, so that no plane and no first corner is preferred.
+// The ring turned and moved at random, with a random first corner and direction. Corners lie up to
+// `off_plane` off the plane.
 Ring placed(const Ring& ring, std::mt19937_64& random, double off_plane = 0.0) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   glm::dvec3 u = glm::normalize(glm::dvec3(unit(random), unit(random), unit(random)));
@@ -148,7 +149,7 @@ TEST(CutPolygon, CombsSpiralsAndStarsAreCoveredInAnyPlane) {
   expect_covered(placed(spiral(20'000), random), "a long spiral");
 }
 
-// A file rounds its coordinates, and people bend their faces.
+// Coordinates are rounded in files, and faces may be a little bent.
 TEST(CutPolygon, NearlyPlanarOnesAreCoveredToo) {
   std::mt19937_64 random(4);
   for (const double off : {1e-12, 1e-6, 1e-3, 0.1}) {
@@ -199,7 +200,7 @@ TEST(CutPolygon, WhatCrossesItselfIsSaid) {
   }
 }
 
-// Corners on a small grid: they repeat, lie on edges, and run back along them.
+// Random corners on a small grid repeat, lie on edges, and run back along edges.
 TEST(CutPolygon, OfAnyRingWhatIsCalledInsideCoversItsArea) {
   std::mt19937_64 random(7);
   std::array<std::size_t, 4> outcomes{};

@@ -63,7 +63,7 @@ TEST(RepairCracks, WiderOnesStayOpenAndNothingMoves) {
   EXPECT_EQ(count_of(repaired.changes, "R14"), ball.triangles.size()) << "every triangle has its own rim";
 }
 
-// Two sheets closer together than the tolerance, edge beside edge. The pairing of edges is partly ambiguous,
+// Two sheets are closer together than the tolerance, edge beside edge. Some pairings of edges are ambiguous,
 // and no triangle may be lost.
 TEST(RepairCracks, NoTriangleIsLostWhereSheetsLieTogether) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
@@ -94,7 +94,7 @@ TEST(RepairCracks, NoTriangleIsLostWhereSheetsLieTogether) {
   }
 }
 
-// A vertex at the middle of the neighbour's edge: a gap without width.
+// A vertex lies at the middle of a neighbour's edge. The gap between them has no width.
 TEST(RepairHoles, ATJunctionIsClosedByAnEdge) {
   TriangleMesh box = make_box_mesh(glm::dvec3(0.5), 1);
   const auto [a, b, c] = box.triangles[0];
@@ -129,7 +129,7 @@ TEST(RepairHoles, SmallOnesAreFilledAndSaid) {
   EXPECT_TRUE(check.findings.empty()) << tests::in_short(check.findings);
   EXPECT_EQ(count_of(repaired.changes, "R13"), 2U);
   EXPECT_EQ(count_of(repaired.changes, "R04"), 0U) << "fills agree with the triangles they meet";
-  // A cap of radius 0.2 is 0.02 high, so flat fills lose two hundredths of a percent of the ball's volume.
+  // A cap of radius 0.2 is 0.02 high, so flat fills lose 0.02 % of the ball's volume.
   EXPECT_NEAR(check.volume_m3, tests::signed_volume(ball), 2e-3);
   EXPECT_LT(check.volume_m3, tests::signed_volume(ball));
   const Finding* filled = find_finding(repaired.changes, "R13");
@@ -155,7 +155,7 @@ TEST(RepairHoles, LargeOnesAndLongOnesAreLeftWithTheReason) {
 TEST(RepairHoles, AFillThatWouldCutTheMeshIsLeft) {
   TriangleMesh holed = without(make_ball_mesh(1.0, 4), {0.0, 0.0, 1.0}, 0.2);
   const auto base = static_cast<std::uint32_t>(holed.vertices.size());
-  // A spike through the hole.
+  // Adds a spike through the hole.
   for (const glm::dvec3& v :
        {glm::dvec3(0.0, 0.0, 0.5), glm::dvec3(0.02, 0.0, 1.5), glm::dvec3(-0.02, 0.01, 1.5)})
     holed.vertices.push_back(v);
@@ -166,7 +166,7 @@ TEST(RepairHoles, AFillThatWouldCutTheMeshIsLeft) {
   EXPECT_EQ(repaired.mesh.triangles.size(), holed.triangles.size());
 }
 
-// Of all fills of a flat non-convex loop, only those inside it have its area.
+// Among the fills of a flat non-convex loop, only those inside the loop have the loop's area.
 TEST(RepairHoles, AFlatLoopThatIsNotConvexIsFilledInside) {
   const TriangleMesh plane = make_plane_mesh(0.5, 16);
   TriangleMesh holed = plane;
@@ -200,7 +200,7 @@ TEST(RepairMesh, NestedAndOverlappingPiecesAreTurnedEachForItself) {
   EXPECT_NEAR(check.volume_m3, 2.0, 1e-12);
 }
 
-// Every pair of triangles intersects, and still the search and the repair end.
+// Every pair of triangles intersects. The search and the repair still end.
 TEST(RepairMesh, EndsWhereEverythingCutsEverything) {
   TriangleMesh mesh;
   std::mt19937_64 random(8);
@@ -219,7 +219,7 @@ TEST(RepairMesh, EndsWhereEverythingCutsEverything) {
   EXPECT_NE(cuts->text.find("at least"), std::string::npos);
 }
 
-// Found by fuzzing: a needle 2.7e8 long and 1e-5 wide, whose normal is mostly rounding error.
+// A case from fuzzing: a needle 2.7e8 m long and 1e-5 m wide, whose normal is mostly rounding error.
 TEST(ClosestOnTriangle, NeedlesAreNotMissedByTheRoundingOfTheirNormal) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> unit(0.0, 1.0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Holes and rims: those that touch are told apart and filled, none is filled twice, and the counts and the
-// outcome that a repair says are those that a check finds afterwards.
+// Holes and rims. Holes that touch are told apart and filled, and none is filled twice. A check of the
+// repaired mesh confirms the counts and the outcome that the repair reports.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 using namespace polygon;
 using tests::count_of;
 
-// What holds after every repair, whatever could be mended.
+// Checks the conditions that hold after every repair, whether or not all defects could be mended.
 void expect_agreement(const TriangleMesh& mesh, const RepairedMesh& repaired) {
   const MeshCheck check = check_mesh(repaired.mesh);
   const std::string said = tests::in_short(repaired.changes) + " | " + tests::in_short(check.findings);
@@ -40,7 +40,7 @@ TriangleMesh without_triangles(const TriangleMesh& mesh, const std::set<std::uin
   return holed;
 }
 
-// The triangles around a vertex, each next to the one before.
+// The triangles around a vertex, in order around it.
 std::vector<std::uint32_t> around(const TriangleMesh& mesh, std::uint32_t vertex) {
   std::vector<std::uint32_t> ring;
   const auto after = [&](const TriangleIndices& t) {
@@ -84,7 +84,7 @@ TEST(RepairRims, HolesThatTouchInAVertexAreFilledEach) {
   }
 }
 
-// At a crease the triangles beside a hole say nothing about the way around the point within its plane.
+// At a crease, the triangles beside a hole do not tell which way leads around the point in the hole's plane.
 TEST(RepairRims, HolesThatTouchOnACreaseAreFilledEach) {
   const TriangleMesh box = make_box_mesh(glm::dvec3(0.5), 4);
   const auto centre = [&](std::uint32_t t) {
@@ -108,7 +108,8 @@ TEST(RepairRims, HolesThatTouchOnACreaseAreFilledEach) {
   EXPECT_GT(pairs, 300U);
 }
 
-// The hole's rim runs around a triangle that hangs in it by one corner, and so passes this corner twice.
+// A triangle hangs in the hole by one corner. The hole's rim runs around the triangle, and so passes this
+// corner twice.
 TEST(RepairRims, AHoleWithATriangleThatHangsInItIsFilledAroundIt) {
   const TriangleMesh ball = make_ball_mesh(1.0, 3);
   const std::vector<std::uint32_t> ring = around(ball, 200);
@@ -117,7 +118,7 @@ TEST(RepairRims, AHoleWithATriangleThatHangsInItIsFilledAroundIt) {
   for (const std::uint32_t corner : ball.triangles[ring[0]]) {
     for (const std::uint32_t t : around(ball, corner)) missing.insert(t);
   }
-  missing.erase(ring[0]);  // hangs by vertex 200, where two of its neighbours stay
+  missing.erase(ring[0]);  // this triangle stays, and hangs by vertex 200
   missing.erase(ring[3]);
   const TriangleMesh holed = without_triangles(ball, missing);
   EXPECT_EQ(count_of(check_mesh(holed).findings, "M09"), 1U);
@@ -153,7 +154,7 @@ TEST(RepairRims, ABallWithManyFacesMissingIsClosed) {
   EXPECT_EQ(closed, 20U);
 }
 
-// An elephant's skin: rough, with thin parts, and so many faces missing that the rims run together.
+// A rough mesh with thin parts, from which so many faces are missing that the rims run together.
 TEST(RepairRims, NoFillRepeatsATriangleOfARoughMesh) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
     std::mt19937_64 random(seed);
@@ -202,7 +203,7 @@ TEST(RepairRims, ClosedAndASheetAreNeverSaidOfOneMesh) {
   EXPECT_EQ(touched_as(check_mesh(plane)), "a two-sided sheet, because 12 edges are open");
   expect_agreement(plane, repair_mesh(plane));
 
-  TriangleMesh fin = ball;  // its rim ends at an edge of three triangles
+  TriangleMesh fin = ball;  // the fin's rim ends at an edge of three triangles
   fin.vertices.emplace_back(5.0, 0.0, 0.0);
   fin.triangles.push_back(
       {fin.triangles[0][0], fin.triangles[0][1], static_cast<std::uint32_t>(fin.vertices.size() - 1)});

@@ -33,7 +33,7 @@ struct Placement {
 
 class MeshSurfacePlaced : public testing::TestWithParam<Placement> {
  protected:
-  // Resolution of coordinates of that size, with a few roundings.
+  // A few roundings of coordinates of this size.
   [[nodiscard]] double tolerance() const {
     return 8e-16 * (glm::length(GetParam().offset) + 4.0 * GetParam().scale);
   }
@@ -102,7 +102,7 @@ TEST_P(MeshSurfacePlaced, NearestIsBruteForce) {
   }
 }
 
-// Beyond hundreds of radii the float distances of all triangles are equal.
+// At distances of hundreds of radii, the distances of all triangles are equal in float.
 TEST_P(MeshSurfacePlaced, NearestFromFarAwayIsBruteForce) {
   const auto [scale, offset] = GetParam();
   std::mt19937_64 random(5);
@@ -149,7 +149,7 @@ TEST_P(MeshSurfacePlaced, InsideIsTheWindingNumber) {
       ASSERT_FALSE(sheet->inside(p)) << "an open sheet has no inside";
     }
     EXPECT_GT(in, 3);
-    // Straight out of and into every corner and edge, where pseudonormals are needed.
+    // Points straight out of and into every corner and edge need pseudonormals.
     for (const glm::dvec3& v : mesh.vertices) {
       const glm::dvec3 d = (v - offset) * 1e-4;
       ASSERT_FALSE(surface->inside(v + d));
@@ -282,7 +282,7 @@ TEST(MeshSurface, AMillionCoincidentTrianglesAreOneElement) {
 }
 
 TEST(MeshSurface, SliverAcrossAnEdgeDoesNotHideTheInside) {
-  // A box with a degenerate triangle at one edge (a T-junction that a flat triangle closes).
+  // A box with a T-junction at one edge, which a degenerate triangle closes.
   TriangleMesh mesh = make_box_mesh(glm::dvec3(1.0), 1);
   const TriangleIndices t = mesh.triangles[0];
   const auto middle = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -299,7 +299,7 @@ TEST(MeshSurface, SliverAcrossAnEdgeDoesNotHideTheInside) {
 }
 
 TEST(MeshSurface, BuildsAMillionTrianglesAndSaysWhatTheyTake) {
-  const TriangleMesh mesh = make_ball_mesh(0.05, 8);  // 1.3 million
+  const TriangleMesh mesh = make_ball_mesh(0.05, 8);  // 1.3 million triangles
   const auto before = std::chrono::steady_clock::now();
   const auto surface = make_mesh_surface(mesh, true);
   const std::chrono::duration<double> build = std::chrono::steady_clock::now() - before;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thesis's algorithm: correct where it is known to be, and with its known faults. Each fault is shown
-// beside the project's own tissue, which does not have it.
+// The thesis's algorithm: first the properties in which it is correct, then its known faults. Each fault is
+// shown beside the project's own tissue, which does not have it.
 #include "voxel/baseline/thesis_chainmail.h"
 
 #include <gtest/gtest.h>
@@ -37,9 +37,10 @@ voxel::LatticeOptions of_slack(double slack) {
                          .shear = slack});
 }
 
-// ---- where it is correct
+// ---- properties in which it is correct
 
-// A push into a homogeneous block moves the octahedron |x|+|y|+|z| < depth/slack, each by depth − slack·L1.
+// A push into a homogeneous block moves the elements of the octahedron |x|+|y|+|z| < depth/slack, each by
+// depth − slack·(|x|+|y|+|z|). Lengths are in spacings.
 TEST(Classic, OnePushMovesTheOctahedron) {
   const double h = 1e-3;
   for (const double slack : {0.1, 0.25}) {
@@ -83,8 +84,8 @@ TEST(Classic, AnchoredElementsStayAndResetGoesToRest) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(object.displacement(object.at(4, 4, k)), glm::vec3(0.0F));
 }
 
-// In a homogeneous block the links of a line through an element add up to one spring times the relative
-// displacement of the line's ends.
+// In a homogeneous block, the forces of all links on a line from an element add up to one spring constant
+// times the relative displacement of the line's ends.
 TEST(Classic, ForceOfTheLinesIsTheirSpringsTimesTheDisplacement) {
   const double h = 1e-3, E = 1e4, nu = 0.3;
   ThesisChainMail object(tests::block({21, 21, 11}, glm::dvec3(h)), of_slack(0.3));
@@ -96,7 +97,8 @@ TEST(Classic, ForceOfTheLinesIsTheirSpringsTimesTheDisplacement) {
   EXPECT_NEAR(object.force_N(v).x, 0.0, 1e-9);
 }
 
-// Damped or in turn, relaxation converges to the equilibrium of its springs, here at rest.
+// Relaxation converges to the equilibrium of the springs if it is damped, or if it takes the elements in
+// turn. Here the equilibrium is the undeformed state.
 TEST(Classic, DampedRelaxationReachesTheEquilibriumOfItsSprings) {
   Random random(3);
   auto volume = tests::block({4, 3, 4}, {1e-3, 1.5e-3, 2e-3});
@@ -137,17 +139,18 @@ TEST(Classic, ALockChangesNothingThatIsFelt) {
 
 // ---- its known faults
 
-// A block of random materials with compatible sources. Beside it, without a link to it, is an anchored layer,
-// because a lattice must have anchors.
+// A block of random materials, with compatible sources. A lattice must have anchors, so an anchored layer
+// lies beside the block, without a link to it.
 struct Sources {
   voxel::LabelVolume volume = tests::block({9, 6, 5}, glm::dvec3(1e-3));
   voxel::LatticeOptions options;
   std::vector<std::array<int, 3>> at;
   std::vector<glm::vec3> move;
-  std::array<std::vector<double>, 3> expected;  // [axis][voxel]: clamp(0, L, U)
+  std::array<std::vector<double>, 3> expected;  // [axis][voxel] clamp(0, L, U) (m)
 };
 
-// Bounds of u(b) − u(a) for neighbours a, b = a + d: along the link, across it.
+// Lower and upper bound of u(b) − u(a) for neighbours a and b (m), for displacements along or across their
+// link.
 std::array<double, 2> bounds(const Sources& c, std::size_t a, std::size_t b, bool along) {
   const auto &m = c.options.materials[c.volume.labels[a]], &n = c.options.materials[c.volume.labels[b]];
   const double h = c.volume.spacing_m.x, across = 0.5 * (m.shear + n.shear) * h;
@@ -156,7 +159,7 @@ std::array<double, 2> bounds(const Sources& c, std::size_t a, std::size_t b, boo
           (0.5 * (m.stretch_max + n.stretch_max) - 1.0) * h};
 }
 
-// L and U of sources at displacement u, by Bellman-Ford.
+// Tightens L and U by the paths from one source at displacement u, by Bellman-Ford.
 void paths_from(const Sources& c, int axis, std::size_t source, double u, std::vector<double>& low,
                 std::vector<double>& high) {
   low[source] = std::max(low[source], u);
@@ -206,7 +209,8 @@ Sources random_sources(Random& random, bool homogeneous, std::size_t count) {
     std::vector<double> low(c.volume.labels.size(), -1e300), high(c.volume.labels.size(), 1e300);
     for (std::size_t s = 0; s < count; ++s) {
       const std::size_t v = c.volume.index(c.at[s][0], c.at[s][1], c.at[s][2]);
-      // The second source is within the interval that the first leaves, and mostly in the opposite direction.
+      // The second source stays within the interval that the first one leaves it. Mostly it moves in the
+      // opposite direction.
       const double wanted = (s == 0 ? 1.0 : -0.9) * random.between(0.0, 2e-3);
       const double u = std::clamp(wanted, low[v] + 1e-9, high[v] - 1e-9);
       c.move[s][axis] = static_cast<float>(u);
@@ -253,10 +257,10 @@ bool chain_ends_elsewhere(const Sources& c) {
       c, [&](int i, int j, int k) { return glm::vec3(state.at(tests::voxel_at(lattice, i, j, k))); });
 }
 
-// Where materials differ one source suffices. A voxel that the queue reaches first along a path that moves it
-// less pulls back voxels that another path has moved further, even the source (Schill, Gibson, Bauer &
-// Männer, Biomechanical simulation of the vitreous humor in the eye using an Enhanced ChainMail Algorithm,
-// 1998).
+// Where materials differ, one source is enough to show the fault. The queue may reach a voxel first along a
+// path that moves it less than another path would. This voxel then pulls back voxels that the other path has
+// moved further, even the source (Schill, Gibson, Bauer & Männer, Biomechanical simulation of the vitreous
+// humor in the eye using an Enhanced ChainMail Algorithm, 1998).
 TEST(ClassicFaults, SourcesEndElsewhereThanTheirDefinition) {
   for (const std::size_t sources : {1U, 2U}) {
     for (const bool homogeneous : {true, false}) {
@@ -320,8 +324,8 @@ TEST(ClassicFaults, FallsThroughAThinSheet) {  // Figs 18 and 19, for voxels
   EXPECT_EQ(soft, 0);
 }
 
-// Fig 22: a corner of a plate, all else anchored. Two links require the same step, and the corner moves by
-// their sum.
+// Fig 22: one corner of a plate is free, and all other elements are anchored. Each of the corner's two links
+// requires the same step, and the corner moves by the sum of both.
 TEST(ClassicFaults, UndampedRelaxationOscillatesForEver) {
   const auto volume = tests::block({4, 4, 1}, glm::dvec3(1e-3));
   voxel::LatticeOptions options = of_slack(0.5);
@@ -349,7 +353,8 @@ TEST(ClassicFaults, UndampedRelaxationOscillatesForEver) {
   EXPECT_LT(glm::length(soft.state().at(v)), 1e-7);
 }
 
-// All elements at the same time, each to the mean of its links: an element and its neighbours alternate.
+// All elements move at the same time, each to the mean of the places that its links require. So an element
+// and its neighbours alternate.
 TEST(ClassicFaults, MeansAllAtOnceTakeTurns) {
   ThesisChainMail object(tests::block({9, 9, 9}, glm::dvec3(1e-3)), of_slack(0.9));
   const ElementId v = object.at(4, 4, 6);

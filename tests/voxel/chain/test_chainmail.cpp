@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ChainMail against its definition: on each axis the new state is clamp(u, L, U), with L and U from shortest
+// ChainMail against its definition: on each axis the new state is clamp(u, L, U). L and U come from shortest
 // paths in the graph of the limits (voxel/chain/chainmail.h).
 #include "voxel/chain/chainmail.h"
 
@@ -30,7 +30,8 @@ TEST(ChainMail, IsTheClampOfItsDefinition) {
     const Lattice lattice(scene.volume, scene.options);
     ChainMail chain(lattice);
     Displacement state(lattice);
-    // First from rest, then from the state that the last round left: any feasible state may be the start.
+    // The first round starts from rest, and each later one from the state that the round before left. Any
+    // feasible state may be the start.
     for (int round = 0; round < 4; ++round) {
       const Displacement before = state;
       Intervals allowed = held_by_anchors(lattice);
@@ -49,7 +50,8 @@ TEST(ChainMail, IsTheClampOfItsDefinition) {
       moved += chain.moved_count();
       sources_in_all += sources.size();
 
-      // With the sources in reverse order not a bit changes, even where their paths are equally long.
+      // With the sources in reverse order no bit of the result changes, even where their paths are equally
+      // long.
       Displacement again = before;
       std::reverse(sources.begin(), sources.end());
       pull(lattice, chain, again, sources);
@@ -77,7 +79,8 @@ TEST(ChainMail, WhatCannotBeReachedGivesWayToAnchors) {
       std::vector<Source> sources;
       Intervals ignored = held_by_anchors(lattice);
       for (const Source& s : feasible_sources(scene, lattice, random, 4, false, ignored)) {
-        // Anywhere: beyond the end of the chain, and incompatible with one another.
+        // The source may be anywhere, even beyond the end of the chain or incompatible with the other
+        // sources.
         glm::vec3 place;
         for (int a = 0; a < 3; ++a) {
           place[a] = static_cast<float>(random.between(-30, 30) * lattice.max_spacing_m());
@@ -116,7 +119,7 @@ TEST(ChainMail, ASourceThatPullsTooFarEndsWhereTheChainEnds) {
   }
 }
 
-// Half-spaces as obstacles of surface voxels, which are clear of them at rest.
+// Half-spaces as obstacles of surface voxels. At rest the voxels do not touch their half-spaces.
 struct ObstacleScene {
   std::vector<Obstacle> obstacles;
 };
@@ -140,7 +143,7 @@ ObstacleScene random_obstacles(const Lattice& lattice, Random& random, bool obli
 
 struct Tally {
   std::size_t settles = 0, deep_settles = 0;
-  double worst_link = 0.0, worst_depth = 0.0;  // of the spacing
+  double worst_link = 0.0, worst_depth = 0.0;  // in spacings
 };
 
 void push_into_obstacles(const RandomScene& scene, const Lattice& lattice, const ObstacleScene& in_the_way,
@@ -189,16 +192,16 @@ TEST(ChainMail, WhatIsPushedIntoASurfaceAlongAnAxisIsStoppedThere) {
 }
 
 TEST(ChainMail, NoObliqueSurfaceBreaksALink) {
-  // The chain treats axes independently. A voxel that is put back onto an oblique half-space moves on all
-  // three axes, and an anchor may prevent that on one of them. Then the voxel stays in the obstacle until it
-  // is relaxed.
+  // The chain treats the axes independently. A voxel that is put back onto an oblique half-space moves on all
+  // three axes. An anchor may prevent the move on one axis. Then the voxel stays in the obstacle until it is
+  // relaxed.
   Random random(14);
   Tally any, plane;
   for (int n = 0; n < 400; ++n) {
     const RandomScene scene = random_scene(random, 1 + random.below(4));
     const Lattice lattice(scene.volume, scene.options);
     push_into_obstacles(scene, lattice, random_obstacles(lattice, random, true, 0.3), random, any);
-    // One plane beside the object, as a bone would be.
+    // One plane lies beside the object, like the surface of a bone.
     ObstacleScene bone = random_obstacles(lattice, random, true, 0.0);
     const glm::vec3 normal(
         glm::normalize(glm::dvec3(random.between(-1, 1), random.between(-1, 1), random.between(-1, 1))));
@@ -232,12 +235,12 @@ TEST(ChainMail, ADeepPushMovesAnOctahedron) {
     std::vector<RowId> once(chain.moved_rows().begin(), chain.moved_rows().end());
     std::sort(once.begin(), once.end());
     EXPECT_EQ(std::adjacent_find(once.begin(), once.end()), once.end());
-    // Rows along x, one for each y and z of the octahedron.
+    // The moved rows run along x, one for each y and z of the octahedron.
     EXPECT_EQ(once.size(), static_cast<std::size_t>(2 * n * n + 2 * n + 1));
     EXPECT_EQ(chain.moved_count(), 31 * once.size());
     EXPECT_LE(chain.work(), once.size());
   }
-  // All three axes at once move the union of three octahedra: the same one.
+  // A move along all three axes moves the union of three octahedra, which are equal.
   Displacement state(lattice);
   pull(lattice, chain, state,
        {{voxel_at(lattice, 15, 15, 15), glm::vec3(static_cast<float>(0.5 * h * 4.5))}});

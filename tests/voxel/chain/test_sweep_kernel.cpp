@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The sweep kernel in every register width that this processor has, and the set of moved rows.
+// The sweep kernel in every register width of this processor, and the set of moved rows.
 #include "voxel/chain/sweep_kernel.h"
 
 #include <gtest/gtest.h>
@@ -14,12 +14,13 @@
 namespace voxel {
 namespace {
 
-// A strip of rows, and the strips before it in z and in x, each with an empty row at both ends.
+// A strip (rows consecutive in y), and the strips before it in z and in x. Each strip has an empty row at
+// both ends.
 struct Strips {
   static constexpr int kRows = 12;
   static constexpr std::size_t kAll = kRows + 2;
 
-  std::array<std::vector<float>, 3> u;  // own, z, x
+  std::array<std::vector<float>, 3> u;  // the strip itself, the one before it in z, the one before it in x
   std::array<std::vector<std::uint8_t>, 3> labels;
   std::array<std::vector<RowInfo>, 3> info;
   std::vector<std::uint8_t> pending;
@@ -29,7 +30,8 @@ struct Strips {
     std::uniform_int_distribution<int> label(1, materials), any(0, 9);
     for (std::size_t s = 0; s < 3; ++s) {
       u[s].resize(kAll * kRow);
-      labels[s].resize(kAll * kRow + kRow);  // the kernel reads labels a register at a time, beyond the end
+      labels[s].resize(kAll * kRow +
+                       kRow);  // room for the kernel, which reads whole registers of labels beyond the end
       info[s].resize(kAll);
       const int of_strip = label(random);
       for (std::size_t row = 1; row <= kRows; ++row) {
@@ -51,7 +53,8 @@ struct Strips {
   }
 };
 
-// Random half limits of labels 1 to 39; label 0 has no links.
+// [label] random half limits of labels 1 to 39. The half limit of the others is large, because label 0 has no
+// links.
 std::vector<float> halves(std::mt19937& random) {
   std::uniform_real_distribution<float> limit(0.01F, 0.2F);
   std::vector<float> out(256, 1e30F);

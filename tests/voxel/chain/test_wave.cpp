@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The methods of a wave (voxel/chain/wave.h): cones and sweeps, rounding over a session, budgets.
+// The methods of a wave (voxel/chain/wave.h): cones and sweeps, their rounding over a long session, and
+// budgets.
 #include "voxel/chain/wave.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +23,8 @@ using namespace tests;
 using voxel::LatticeOptions;
 using voxel::RowId;
 
-// Blocks and lenses of one material, larger than a row, pushed at their surface: cones in closed form, cut by
-// faces and anchors, also in bodies that are no boxes.
+// Blocks and lenses of one material, wider than a row, are pushed at their surface. They move in cones of
+// closed form, which faces and anchors cut. Some bodies are not boxes.
 TEST(ChainMail, ConesAreTheClampToo) {
   Random random(15);
   double worst = 0.0;
@@ -32,7 +33,7 @@ TEST(ChainMail, ConesAreTheClampToo) {
     scene.volume = block({20 + random.below(60), 5 + random.below(12), 5 + random.below(12)},
                          {random.between(0.5e-3, 2e-3), random.between(0.5e-3, 2e-3), 1e-3});
     auto& volume = scene.volume;
-    if (n % 3 == 0) {  // a lens, or a slit in a block
+    if (n % 3 == 0) {  // a lens; in the next case, a slit in a block
       for (int k = 0; k < volume.dims[2]; ++k) {
         for (int j = 0; j < volume.dims[1]; ++j) {
           for (int i = 0; i < volume.dims[0]; ++i) {
@@ -59,8 +60,8 @@ TEST(ChainMail, ConesAreTheClampToo) {
   std::cout << "largest error " << worst << " of the largest displacement\n";
 }
 
-// Blocks of many materials over several rows, in layers, in lumps and at random, with holes and anchors. Rows
-// have one label or many, and some scenes have more labels than two registers of half limits hold.
+// Blocks of many materials over several rows, in layers, in lumps or at random, with holes and anchors. Rows
+// have one label or many. Some scenes have more labels than two registers of half limits can hold.
 TEST(ChainMail, SweepsAreTheClampToo) {
   Random random(18);
   double worst = 0.0;
@@ -134,7 +135,8 @@ TEST(ChainMail, RoundingDoesNotAddUpOverASession) {
   }
 }
 
-// Number of links that exceed their limits by more than `tolerance` and have no end in a waiting row.
+// Number of links that exceed their limits by more than `tolerance`, although neither of their voxels is in a
+// waiting row.
 std::size_t unexplained(const std::array<std::vector<Arc>, 3>& arcs, const Displacement& state,
                         const ChainMail& chain, double tolerance) {
   const auto waiting = chain.waiting_rows();
@@ -155,7 +157,7 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
   Random random(17);
   std::size_t partial = 0, stopped = 0, calls = 0, sweeping_calls = 0;
   for (int n = 0; n < scenes(40); ++n) {
-    // A budget too small for a sweep, or large enough for a sweep to begin.
+    // The budget is too small for a sweep, or large enough for a sweep to begin.
     const bool sweeps = n % 4 == 3;
     const std::uint64_t budget = sweeps ? 1540 : 100;
     const int least = sweeps ? 24 : 10;
@@ -170,7 +172,7 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
     ChainMail chain(lattice), whole(lattice);
     Displacement state(lattice), reference(lattice);
     const int nx = volume.dims[0], ny = volume.dims[1], nz = volume.dims[2];
-    const double far = 0.1e-3 * (nz - 1);  // within the chain's length from the anchors
+    const double far = 0.1e-3 * (nz - 1);  // at most the length of the chain from the anchors (m)
     double asked = 0.0;
     for (int round = 0; round < 4; ++round) {
       const VoxelId v = voxel_at(lattice, random.below(nx), random.below(ny), nz - 1);
@@ -194,7 +196,8 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
       (sweeps ? stopped : partial) += waits;
       ASSERT_EQ(unexplained(arcs, state, chain, tolerance), 0U) << "scene " << n << ", round " << round;
       if (round == 0) {
-        // The source is where it was put, and its own links keep their limits, whatever else waits.
+        // The source is at its prescribed place, and its own links keep their limits, whichever rows still
+        // wait.
         EXPECT_EQ(state.at(v), glm::dvec3(place));
         for (int axis = 0; axis < 3; ++axis) {
           const auto interval = voxel::link_interval(lattice, state, v, axis);

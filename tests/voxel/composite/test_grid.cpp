@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // CompositeGrid against its reference: the whole lattice at equilibrium within its limits. Small lattices are
-// solved directly. In large ones nested patches are compared with a CompositeGrid of all voxels.
+// solved directly. For large lattices, nested patches are compared with a CompositeGrid that has all voxels
+// on level 0.
 #include "voxel/composite/grid.h"
 
 #include <gtest/gtest.h>
@@ -28,8 +29,8 @@ using voxel::LinkMaterial;
 using voxel::VoxelId;
 using Index3 = CompositeGrid::Index3;
 
-// A body, given voxel by voxel: whether it is there, whether it is anchored. `tissue`: its stiffness relative
-// to the first tissue; null: one tissue.
+// A body that is given voxel by voxel: `filled` and `anchored` decide for each voxel. `tissue` gives its
+// Young's modulus in units of 10 kPa; if null, there is one tissue.
 struct Body {
   voxel::LatticeOptions options;
   std::shared_ptr<const Lattice> lattice;
@@ -63,7 +64,7 @@ bool below(const Index3& p) {
   return p[2] == 0;
 }
 
-// A square of the top, pressed down by `depth`.
+// A square of voxels of the top, pressed down by `depth` (m).
 struct PressedSquare {
   Index3 middle;
   int half;
@@ -87,9 +88,9 @@ void press(CompositeGrid& grid, const PressedSquare& patch, int cycles) {
   }
 }
 
-// Direct solution with the links of the lattice and their limits: sparse Cholesky and an augmented
-// Lagrangian. Here the square sticks to the tool. This makes no difference, because the tissue pulls all of
-// it up.
+// Direct solution with the lattice's links and their limits, by sparse Cholesky factorisation and an
+// augmented Lagrangian. Here the square sticks to the tool. This makes no difference, because the tissue
+// pushes every voxel of the square against the tool.
 tests::Problem solved_directly(const Body& body, const PressedSquare& patch) {
   voxel::Displacement state(*body.lattice);
   patch.for_voxels([&](const Index3& p) {
@@ -114,7 +115,7 @@ double force_of(const Body& body, const tests::Problem& problem) {
 }
 
 struct Difference {
-  double displacement = 0.0, force = 0.0;  // of the depth; of the force
+  double displacement = 0.0, force = 0.0;  // relative to the depth; relative to the force
 };
 Difference compare(const Body& body, const PressedSquare& patch, int half_width) {
   const tests::Problem direct = solved_directly(body, patch);
@@ -136,7 +137,7 @@ Difference compare(const Body& body, const PressedSquare& patch, int half_width)
   return most;
 }
 
-// With level 0 covering the object the result is that of the lattice, whatever its dimensions.
+// If level 0 covers the object, the result is that of the lattice, whatever its dimensions.
 TEST(CompositeGrid, AllVoxelsAreTheLatticeAtEquilibrium) {
   for (const Index3& dims : {Index3{13, 13, 11}, Index3{12, 15, 10}, Index3{9, 16, 14}}) {
     for (const double depth : {0.3, 1.0}) {
@@ -158,7 +159,7 @@ TEST(CompositeGrid, AnchorsAreHeldWhereverTheyAre) {
   EXPECT_LT(d.displacement, 2e-3);
   EXPECT_LT(d.force, 5e-3);
   const Body lump(dims, 0.2, everywhere, [](const Index3& p) { return p[0] < 5 && p[1] > 7 && p[2] < 6; });
-  // At the edge of the anchors links exceed their limits, which the bounds do not prevent.
+  // At the edge of the anchors some links exceed their limits. The grid's bounds do not prevent this.
   d = compare(lump, patch, CompositeGrid::kRefineAll);
   EXPECT_LT(d.displacement, 0.06);
   EXPECT_LT(d.force, 0.03);
@@ -188,8 +189,8 @@ TEST(CompositeGrid, SheetsOfSingleVoxelsAreInTheLinks) {
   EXPECT_LT(d.force, 0.02);
 }
 
-// Layers and lumps of tissues of different stiffness. Soft layers between stiff ones are compressed to their
-// limits (contrast 4 to 200; depth as a share of the depth at which the chain ends).
+// Layers and lumps of tissues whose stiffnesses differ by factors of 4 to 200. Soft layers between stiff ones
+// are compressed to their limits. The depth is a fraction of the depth at which the chain ends.
 int stiff_soft_stiff(const Index3& p) {
   return p[2] < 4 || p[2] >= 9 ? 4 : 1;
 }
@@ -294,7 +295,8 @@ TEST(CompositeGrid, PatchesInTissuesThatDifferMuch) {
   }
 }
 
-// Stiffness of cubes of cells of any size: layers are in series across them, in parallel along them.
+// Stiffness of cubes of cells of any size. Layers act in series across the layers, and in parallel along
+// them.
 TEST(CompositeGrid, CubesAreAsStiffAsTheirLayers) {
   const int n = 33;
   const auto layers = [](const Index3& p) { return p[2] <= 16 ? 1 : 4; };
@@ -308,7 +310,7 @@ TEST(CompositeGrid, CubesAreAsStiffAsTheirLayers) {
     for (auto& axis : stiff) axis.resize(area);
     for (int z = 0; z < count; ++z) {
       cells.cube_stiffness(m, z, 0, count, 0, count, {stiff[0].data(), stiff[1].data(), stiff[2].data()});
-      // A cell between two layers is as stiff as the softer one.
+      // A cell between two layers is as stiff as the softer layer.
       double across = 0.0, yields = 0.0;
       for (int k = z * edge; k < (z + 1) * edge; ++k) {
         across += k <= 16 ? 1.0 : 4.0;
@@ -350,7 +352,7 @@ TEST(CompositeGrid, ThePathThereIsForgotten) {
   EXPECT_LT(glm::length(round.force_on_tool_N()), 1e-3 * direct.force_on_tool_N().z);
 }
 
-// Levels that were built before a contact, all or some, are bit for bit those that begin() would build.
+// Some or all levels are built before the contact. They are bit for bit the levels that begin() would build.
 TEST(CompositeGrid, LevelsBuiltAheadAreThoseBuiltInTime) {
   const int n = 100;
   const Body body({n, n, n}, 0.1, everywhere, below);
@@ -389,7 +391,8 @@ TEST(CompositeGrid, TheFinestPatchHasTheContactAtEachTick) {
   EXPECT_TRUE(has_all_round({30, 70, n - 1}));
 }
 
-// Anchored regions smaller than the cells of coarse levels, and larger ones that follow no line of nodes.
+// Some anchored regions are smaller than the cells of coarse levels. Others are larger, but their borders do
+// not follow the coarse nodes.
 TEST(CompositeGrid, PatchesWithAnchorsAnywhere) {
   using At = const Index3&;
   const auto cube = [](int x, int y, int z, int half) {
@@ -412,7 +415,7 @@ TEST(CompositeGrid, PatchesWithAnchorsAnywhere) {
   EXPECT_LT(anchored_by(everywhere, [](At p) { return p[0] % 4 == 1 && p[1] % 4 == 1 && p[2] == 21; }), 0.05);
   EXPECT_LT(anchored_by(outside_bone, [&](At p) { return from_bone(p) < 13.5; }), 0.03);
   EXPECT_LT(anchored_by(outside_bone, [&](At p) { return p[0] < 30 && from_bone(p) < 13.5; }), 0.05);
-  // A small region alone: most of the resistance is the constriction round it.
+  // For a single small region, most of the resistance is the constriction around it.
   for (const int half : {0, 1, 4, 8})
     EXPECT_LT(anchored_by(everywhere, cube(27, 34, 25, half)), 0.08) << half;
   EXPECT_LT(anchored_by(everywhere, cube(30, 30, 0, 1)), 0.08);

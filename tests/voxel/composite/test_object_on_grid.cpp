@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A SoftObject whose contact is solved on a CompositeGrid: the force, the energy and the dent it shows.
+// A SoftObject whose contact is solved on a CompositeGrid: its force, its energy and its visible dent.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,7 +47,8 @@ TEST(ObjectOnGrid, FeelsTheLatticeAtEquilibriumThatAnchorsCarry) {
   }
 }
 
-// At half a spacing per tick, inwards and outwards, the force belongs to the present place of the tool.
+// The tool moves by half a spacing per tick, inwards and outwards. The force is that of the tool's present
+// place.
 TEST(ObjectOnGrid, AMovingToolFeelsTheForceOfWhereItIs) {
   Pressed pressed;
   ASSERT_TRUE(pressed.on_grid);
@@ -83,7 +84,7 @@ TEST(ObjectOnGrid, ShowsItsDentAndKeepsItsState) {
   EXPECT_EQ(object.energy_J(), 0.0);
 }
 
-// The force is the slope of the energy, so that the hand gets back the work that it has done.
+// The force is the derivative of the energy, so that the object returns the work done on it.
 TEST(ObjectOnGrid, StoresWhatIsGiven) {
   Pressed pressed;
   ASSERT_TRUE(pressed.on_grid);

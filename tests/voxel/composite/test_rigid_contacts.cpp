@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Contacts of a CompositeGrid with rigid surfaces that stand still, against a brute-force solution: projected
-// Gauss-Seidel over all voxels of the lattice, until nothing moves.
+// Contacts of a CompositeGrid with rigid surfaces at rest, against a brute-force solution. The reference is
+// projected Gauss-Seidel over all voxels of the lattice, until no voxel moves.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,19 +25,20 @@ using voxel::Obstacle;
 using voxel::VoxelId;
 using Index3 = CompositeGrid::Index3;
 
-// Its links never reach their limits here.
+// A material whose links never reach their limits in these tests.
 const voxel::LinkMaterial kLoose{
     .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.001, .stretch_max = 9.0, .shear = 9.0};
 
-// A slab that two of its sides hold, a square of its top pressed down, and a rigid ball under it.
+// A slab that is held at two of its sides. A square of its top is pressed down, and a rigid ball lies under
+// it.
 struct Slab {
   std::shared_ptr<const Lattice> lattice;
   std::vector<Obstacle> obstacles;  // [surface number]
-  Index3 middle{};                  // of the square
+  Index3 middle{};                  // middle voxel of the square
   int half = 2;
   double depth_m = 0.0;
 
-  // `layers`: three voxels of skin on fat on muscle, in place of one tissue.
+  // `layers`: skin (three voxels) on fat on muscle, instead of one tissue.
   Slab(const Index3& dims, std::mt19937& random, bool layers = false) {
     const auto between = [&](double low, double high) {
       return std::uniform_real_distribution(low, high)(random);
@@ -83,14 +84,14 @@ struct Slab {
 };
 
 struct Solution {
-  double tool_N = 0.0, rigid_N = 0.0;  // along z, on the object
-  std::size_t on_rigid = 0;            // voxels
+  double tool_N = 0.0, rigid_N = 0.0;  // force of the tool and of the ball on the object, along z
+  std::size_t on_rigid = 0;            // number of voxels that touch the ball
 };
 
 Solution brute_force(const Slab& slab) {
   struct Node {
-    std::array<int, 6> beside{};         // [2 d + side]; −1: none
-    std::array<glm::dvec3, 6> spring{};  // (N/m)
+    std::array<int, 6> beside{};         // [2 d + side] index of the neighbour; −1: none
+    std::array<glm::dvec3, 6> spring{};  // [2 d + side] spring of the link (N/m)
     glm::dvec3 u{0.0}, compliance{0.0};
     const Obstacle* obstacle = nullptr;
     bool fixed = false, pressed = false;
@@ -199,8 +200,9 @@ Felt on_patches(const Slab& slab, int half_width) {
   return felt;
 }
 
-// With all voxels on level 0 the result is that of the lattice. Oblique planes are met in one axis and loaded
-// on the others, and must come to the same.
+// With all voxels on level 0, the result is that of the lattice. The grid meets an oblique plane on one axis
+// and applies its load on the others. The reference projects along the plane's normal. Both must give the
+// same result.
 TEST(RigidContacts, AllVoxelsAreTheLatticeAtEquilibrium) {
   std::mt19937 random(1);
   for (int scene = 0; scene < 40; ++scene) {
@@ -216,8 +218,8 @@ TEST(RigidContacts, AllVoxelsAreTheLatticeAtEquilibrium) {
   }
 }
 
-// On patches the contact may be known by coarse nodes. The tolerance is that of patches of this width without
-// rigid surfaces.
+// With nested patches, coarse nodes may represent the contact. The tolerance is that of patches of this width
+// without rigid surfaces.
 TEST(RigidContacts, PatchesComeNearTheLattice) {
   constexpr int kHalfWidth = 8;
   std::mt19937 random(2);
@@ -231,7 +233,7 @@ TEST(RigidContacts, PatchesComeNearTheLattice) {
   }
 }
 
-// The same where tissues differ in stiffness.
+// The same comparison for tissues of different stiffness.
 TEST(RigidContacts, LayersAreTheLatticeAtEquilibrium) {
   std::mt19937 random(3);
   for (int scene = 0; scene < 10; ++scene) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The accurate energy as a soft object relaxes it, against finite elements and against the same energy solved
-// plainly.
+// Relaxation of the accurate energy in a soft object, against finite elements and against a plain solver of
+// the same energy.
 #include "voxel/fem/deferred_correction.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ voxel::SoftObject object_of(const voxel::LabelVolume& volume, const voxel::Latti
   return voxel::SoftObject(std::make_shared<voxel::Lattice>(volume, options));
 }
 
-// ---- what a cell's bricks and links are to one another ----
+// ---- a cell's bricks compared with its links ----
 
 TEST(BrickLoads, LinksOfACellAreItsShareOfTheLattice) {
   const glm::dvec3 spacing(1e-3, 0.7e-3, 2e-3);
@@ -38,7 +38,7 @@ TEST(BrickLoads, LinksOfACellAreItsShareOfTheLattice) {
   const voxel::Lattice lattice(volume, tests::made_of(tests::elastic(7e3, 0.4)));
   const voxel::NodeStencil inside = voxel::node_stencil(voxel::link_cell_stiffness(7e3, 0.4, spacing));
   const voxel::VoxelSprings springs = lattice.springs_of(lattice.at(1, 1, 1));
-  const std::array<std::size_t, 3> up{14, 16, 22};  // number of the neighbour
+  const std::array<std::size_t, 3> up{14, 16, 22};  // [d] the upper neighbour's number in the stencil
   for (std::size_t d = 0; d < 3; ++d) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float k = springs.up[d].on(static_cast<int>(axis), static_cast<int>(d));
@@ -64,7 +64,7 @@ TEST(BrickLoads, NoDeformationTakesMoreThanTheLargestRatio) {
   for (int n = 0; n < 2000; ++n) {
     std::array<double, 24> u{};
     for (double& x : u) x = random.between(-1.0, 1.0);
-    if (n == 0) {  // swelling, which bricks resist and links hardly do
+    if (n == 0) {  // uniform swelling: bricks resist it far more than links
       for (std::size_t i = 0; i < 24; ++i) u[i] = (i / 3 >> i % 3 & 1U) != 0 ? 1.0 : -1.0;
     }
     found = std::max(found, energy(brick, u) / energy(links, u));
@@ -75,8 +75,8 @@ TEST(BrickLoads, NoDeformationTakesMoreThanTheLargestRatio) {
 
 // ---- the state of rest ----
 
-// A body of random tissues, with holes and slits, held at its bottom and at a few voxels of its surface that
-// are somewhere else; and the same as a plain problem.
+// A body of random tissues with holes. It is held at its bottom, and at a few displaced voxels of its
+// surface. plain() is the same body for the plain solver.
 struct Pulled {
   tests::VoxelBody body;
   voxel::LatticeOptions options;
@@ -105,7 +105,8 @@ struct Pulled {
         }
       }
     }
-    // What hangs on nothing has no state of rest: taken away, until nothing is.
+    // A loose piece has no state of rest. So every voxel without a voxel below it is removed, until none is
+    // left.
     for (bool again = true; again;) {
       again = false;
       for (int k = 1; k < body.dims[2]; ++k) {
@@ -139,7 +140,7 @@ struct Pulled {
     }
   }
 
-  // At rest.
+  // The solved equilibrium.
   [[nodiscard]] tests::PlainProblem plain() const {
     tests::PlainProblem out = problem_of(body, tests::Energy::accurate);
     for (int j = 0; j < body.dims[1]; ++j) {
@@ -164,7 +165,7 @@ struct Pulled {
   }
 };
 
-// Largest difference of any displacement, in shares of the largest.
+// Largest error of a displacement, relative to the largest displacement.
 double difference(const voxel::SoftObject& object, const Pulled& scene, const tests::PlainProblem& plain) {
   double most = 0.0, worst = 0.0;
   for (int k = 0; k < scene.body.dims[2]; ++k) {
@@ -181,8 +182,8 @@ double difference(const voxel::SoftObject& object, const Pulled& scene, const te
   return worst / most;
 }
 
-// At rest is what is pulled by less than a share of the force scale of all of it: tissue a hundred times
-// softer than what is beside it is within 1 % then.
+// An object is at rest if no residual exceeds a fraction of the force scale of the whole object. Then even
+// tissue that is a hundred times softer than its neighbours is within 1 % of its equilibrium.
 TEST(BrickLoads, AnyBodyComesToRestWhereItsBricksDo) {
   double worst = 0.0;
   int cycles = 0;
@@ -205,7 +206,7 @@ TEST(BrickLoads, AnyBodyComesToRestWhereItsBricksDo) {
             << " cycles\n";
 }
 
-// Relaxed apart the loads go over with the ways, and both come to the same rest.
+// A ShadowObject that relaxes the object also transfers the brick loads. So both come to the same rest.
 TEST(BrickLoads, AnotherThatRelaxesItComesToTheSameRest) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const Pulled scene(seed);
@@ -225,7 +226,7 @@ TEST(BrickLoads, AnotherThatRelaxesItComesToTheSameRest) {
   }
 }
 
-// ---- against the truth ----
+// ---- against finite elements and other references ----
 
 double pressed_by_punch(const tests::ReferenceRow& row) {
   const double h = row.spacing_m, depth = 1e-3;
@@ -250,7 +251,7 @@ double pressed_by_punch(const tests::ReferenceRow& row) {
   object.settle_dragged();
   double force = 0.0, before = 0.0;
   for (int cycle = 1; cycle <= 400; ++cycle) {
-    // The punch is smooth: what it presses slides along its face.
+    // The punch is smooth, so the pressed voxels slide along its face.
     for (const voxel::VoxelId v : punched) {
       const glm::dvec3 wanted = object.unconstrained_minimum(v);
       object.move(v, {wanted.x, wanted.y, -depth});
@@ -280,7 +281,8 @@ TEST(BrickLoads, ABlockIsTheFiniteElements) {
   std::cout << "bricks in the store | " << rows << " rows, 2.5 and 5 mm | within " << 100 * worst << " %\n";
 }
 
-// A ball of 4 spacings' radius, through contact and its condensation, not by prescribed voxels.
+// A ball with a radius of 4 spacings. It acts through contact and its condensation, not through prescribed
+// displacements.
 TEST(BrickLoads, TheToolFeelsTheSlopeOfItsEnergy) {
   for (const double poisson : {0.3, 0.45}) {
     const double h = 1e-3, radius = 4e-3;
@@ -321,7 +323,7 @@ TEST(BrickLoads, MaterialsChooseEachForItself) {
     return std::fabs(load[0]) + std::fabs(load[1]) + std::fabs(load[2]);
   };
   EXPECT_GT(load_at(19), 0.0F);
-  EXPECT_GT(load_at(20), 0.0F);  // the cells between the two are of the softer one
+  EXPECT_GT(load_at(20), 0.0F);  // cells between the two materials belong to the softer one, which has bricks
   EXPECT_EQ(load_at(22), 0.0F);
 }
 
@@ -337,8 +339,8 @@ TEST(BrickLoads, LeavesNothingBehind) {
   EXPECT_LT(most, 1e-3 * 1.5e-3);
 }
 
-// In units of Young's modulus and the spacing a force is the same number, from a soft micrometer to a hard
-// ten meters.
+// A force in units of Young's modulus times the spacing squared is the same number for spacings from 1 µm to
+// 10 m and moduli from 1 Pa to 1 TPa.
 TEST(BrickLoads, UnitsDoNotMatter) {
   double expected = 0.0;
   for (const double h : {1e-3, 1e-6, 10.0}) {
@@ -354,7 +356,7 @@ TEST(BrickLoads, UnitsDoNotMatter) {
   EXPECT_GT(expected, 0.1);
 }
 
-// Sheets and rows of single voxels have no brick, and tissue without slack has bricks that never deform.
+// Thin bodies have few bricks, and tissue without slack has bricks that never deform.
 TEST(BrickLoads, WhatIsThinOrTightIsFiniteAndComesToRest) {
   for (const std::array<int, 3>& dims : {std::array{17, 17, 2}, std::array{9, 2, 12}, std::array{2, 2, 2}}) {
     for (const bool tight : {false, true}) {

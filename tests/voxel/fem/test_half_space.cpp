@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Newtons from Young's modulus and Poisson's ratio: Hertz's ball and the flat punch on the six-link energy.
+// Forces from Young's modulus and Poisson's ratio with the six-link energy, against Hertz's ball and the flat
+// punch.
 //
-// Pressing a block's face moves its voxels along the face's normal only, and on a block of one material the
-// cosines are the lattice's own modes across, each of which decays downwards in closed form. So contact is
-// solved here exactly, on blocks of any size, in the contact's unknowns alone.
+// With this energy, pressing a block's face moves its voxels only along the face's normal. In a block of one
+// material, the lattice's modes are cosines across the face, and each mode decays downwards in closed form.
+// So the contact is solved exactly, for blocks of any size. Its only unknowns are the forces on the pressed
+// voxels.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -18,8 +20,8 @@
 
 namespace {
 
-// Displacement by force between the top voxels first … first+wide−1 of a block of n×n×nz voxels, spacing and
-// E 1, base held.
+// Compliance between top voxels of a block of n × n × nz voxels with a held base. It covers the voxels first
+// to first + wide − 1 in x and in y. The spacing and Young's modulus are 1.
 class Face {
  public:
   Face(int n, int nz, double across, int first, int wide) : wide_(wide) {
@@ -37,7 +39,8 @@ class Face {
     Eigen::MatrixXd compliance(n, n);
     for (int a = 0; a < n; ++a) {
       for (int b = 0; b < n; ++b) {
-        // A wave falls by e^−μ a layer; borders of half weight leave E·sinh μ at the surface.
+        // A mode decays by e^−μ per layer. The top layer's links count half, so a deep block has the
+        // stiffness sinh μ at its surface.
         const double mu = 2 * std::asinh(0.5 * std::sqrt(across * (curvature[a] + curvature[b])));
         const double stiffness = mu < 1e-12 ? 1.0 / (nz - 1) : std::sinh(mu) / std::tanh(mu * (nz - 1));
         compliance(a, b) = 1 / (norm[a] * norm[b] * stiffness);
@@ -46,7 +49,7 @@ class Face {
     table_ = pairs.transpose() * compliance * pairs;
   }
 
-  // Voxel `load` pushed by a force of 1 moves voxel `at` so far; each (x, y) from `first`.
+  // Displacement of voxel `at` by a force of 1 on voxel `load`. Both are (x, y), counted from `first`.
   [[nodiscard]] double operator()(std::array<int, 2> at, std::array<int, 2> load) const {
     return table_(at[0] * wide_ + load[0], at[1] * wide_ + load[1]);
   }
@@ -61,7 +64,8 @@ struct Contact {
   int voxels = 0;
 };
 
-// Voxels pushed to `depth`; none is pulled. A punch has no such choice: all of its forces push.
+// Presses the voxels `at` to `depth`. Voxels that would be pulled are released. Under a punch all forces
+// push, so none is released.
 Contact press(const Face& face, std::vector<std::array<int, 2>> at, std::vector<double> depth) {
   for (;;) {
     const auto n = static_cast<Eigen::Index>(at.size());
@@ -116,7 +120,8 @@ struct Errors {
   double hertz, punch, punch_radius;
 };
 
-// Against the half-space, on a cube `width` contact radii wide; a, the contact radius, in spacings.
+// Relative errors of a cube against the half-space. The contact radius is `a` spacings, and the cube is
+// `width` contact radii wide.
 Errors errors_of(double a, double poisson, double width) {
   const int n = static_cast<int>(width * a) | 1, reach = static_cast<int>(1.42 * a) + 1;
   const Face face(n, n, across(poisson), n / 2 - reach, 2 * reach + 1);
@@ -129,7 +134,8 @@ Errors errors_of(double a, double poisson, double width) {
       if (r2 <= a * a) under_punch.push_back({i + reach, j + reach});
       if (r2 >= 2 * a * a) continue;
       under_ball.push_back({i + reach, j + reach});
-      depth.push_back(1 - r2 / (2 * a * a));  // radius a² at a depth of 1: Hertz's contact radius is a
+      depth.push_back(1 -
+                      r2 / (2 * a * a));  // a ball of radius a² at a depth of 1 has Hertz's contact radius a
     }
   }
   const double ball = press(face, under_ball, depth).force;
@@ -155,10 +161,11 @@ TEST(HalfSpace, ABallAndAPunchAreHertzs) {
   }
 }
 
-// What is left is the block's, and falls with its width: without it, the half-space. A punch ends 0.11
-// spacings inside the circle of its voxels' area: the edge of a straight row of nodes lies a quarter to 0.28
-// outside them (from the factors of the surface's Wiener-Hopf problem), less than their half spacing, and a
-// circle's steps are rough.
+// The remaining error is due to the finite block and is inversely proportional to its width. Extrapolated to
+// infinite width, the forces are those of the half-space. The punch's effective radius is 0.11 spacings
+// smaller than that of a circle of its voxels' area. The effective edge of a straight row of nodes lies 0.25
+// to 0.28 spacings outside the nodes (from the factors of the surface's Wiener-Hopf problem), while the
+// voxels' area ends half a spacing outside. The steps of a circle's edge reduce the difference.
 TEST(HalfSpace, TheRestIsTheBlocks) {
   for (const double a : {4.0, 6.0, 8.0}) {
     for (const double poisson : {0.0, 0.3, 0.45}) {

@@ -69,7 +69,7 @@ TEST(BrickElement, RigidMotionsCostNothing) {
   }
 }
 
-// The patch test: a constant strain has the closed form's energy and forces, per element.
+// Patch test of one element: under a constant strain, its forces are those of the closed form.
 TEST(BrickElement, ReproducesAConstantStrain) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> number(-1.0, 1.0);
@@ -92,7 +92,8 @@ TEST(BrickElement, ReproducesAConstantStrain) {
   }
 }
 
-// … and in an assembly of bricks of different edge lengths, solved from its border.
+// Patch test of an assembly of bricks with three different edge lengths. The border is prescribed, and the
+// nodes inside are solved.
 TEST(BrickElement, ReproducesAConstantStrainInAPatch) {
   const glm::dvec3 h(1e-3, 2e-3, 3e-3);
   const int n = 4;
@@ -127,7 +128,8 @@ TEST(BrickElement, ReproducesAConstantStrainInAPatch) {
     EXPECT_LT((patch.u[v] - expected[v]).norm(), 1e-12 * expected.back().norm());
 }
 
-// Euler's beam, one brick thick, sheared at its end. Plain bricks lock here.
+// Stiffness of an Euler beam under a transverse force at its end. With one brick over the thickness, plain
+// bricks lock.
 double cantilever_stiffness(double poisson, int long_, int thick, double edge) {
   const glm::dvec3 h(edge, 1e-3, 1e-3);
   const auto at = [&](int i, int j, int k) {
@@ -161,9 +163,10 @@ TEST(BrickElement, BendsAsABeamDoes) {
   const double length = 16e-3, inertia = std::pow(1e-3, 4) / 12,
                euler = 3 * 1e4 * inertia / std::pow(length, 3);
   for (const double poisson : {0.0, 0.3, 0.499}) {
-    // Timoshenko's shear adds E h² / (4 G l²) · 1.2 to the compliance: 0.2 to 0.4 %.
+    // Timoshenko's shear adds the fraction 1.2 · E h² / (4 G l²) to the compliance: 0.2 to 0.4 %.
     EXPECT_NEAR(cantilever_stiffness(poisson, 16, 1, 1e-3), euler, 0.03 * euler) << poisson;
-    // Bricks four times as long as the beam is thick prevent most change of its section: 8.6 % at 0.499.
+    // Bricks four times as long as the beam is thick prevent most of the deformation of its section. This
+    // adds 8.6 % at a Poisson's ratio of 0.499.
     const double part = poisson < 0.4 ? 0.03 : 0.1;
     EXPECT_NEAR(cantilever_stiffness(poisson, 4, 1, 4e-3), euler, part * euler) << poisson;
   }

@@ -16,7 +16,7 @@ using voxel::brick_stiffness;
 using voxel::BrickStiffness;
 using voxel::NodeField;
 
-// A lattice with displacements of about `size` around `shift`.
+// A lattice of nodes with random displacements of about `size` around `shift`.
 struct Field {
   static constexpr int kX = 23, kY = 5, kZ = 5;
   std::array<std::vector<float>, 3> u;
@@ -36,7 +36,7 @@ struct Field {
   [[nodiscard]] NodeField view() const { return {{u[0].data(), u[1].data(), u[2].data()}, kX, kX * kY}; }
 };
 
-// Force on a node, in doubles, brick by brick.
+// Force on a node, added up brick by brick in double.
 Eigen::Vector3d expected_force(const voxel::BricksAround& bricks, const Field& field,
                                std::array<int, 3> node) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -125,7 +125,7 @@ TEST(BrickForce, DiagonalBlocksAreSymmetricAndPositive) {
     const Eigen::Matrix3f own = block(13);
     EXPECT_EQ(own, own.transpose());
     EXPECT_GT(own.determinant(), 0.0F);
-    // The blocks of a node sum to nothing.
+    // The 27 blocks of a node sum to zero.
     Eigen::Matrix3f sum = Eigen::Matrix3f::Zero();
     for (std::size_t o = 0; o < 27; ++o) sum += block(o);
     EXPECT_LT(sum.norm(), 1e-5F * own.norm());

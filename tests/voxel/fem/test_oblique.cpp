@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A block that does not lie along the lattice: how much of its stiffness is the lattice's doing.
+// Blocks whose axes do not lie along the lattice: how far the lattice's directions change their stiffness.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -17,7 +17,7 @@ using tests::Energy;
 
 constexpr double kYoung = 1e4;
 
-// Rows: the block's own x, y and up, in the lattice.
+// A rotation whose rows are the block's x, y and up in the lattice's frame.
 Eigen::Matrix3d frame(const Eigen::Vector3d& x, const Eigen::Vector3d& up) {
   Eigen::Matrix3d out;
   out.row(0) = x.normalized();
@@ -37,9 +37,10 @@ std::vector<Orientation> orientations() {
           {"(111)", frame({1, -1, 0}, {1, 1, 1})}};
 }
 
-// A face pressed along its normal n feels, in the half-space, one scalar wave an axis: across·sqrt of its own
-// tensor; and the traction along n moves each of them. Mean compliance over the directions of a wave, as a
-// round contact has it.
+// Contact modulus of a half-space with normal n under the six-link energy. Each displacement component is a
+// scalar field whose stiffness tensor is 1 along its own axis and `across` along the others. A surface wave
+// along q meets the stiffness √(nn·qq − nq²) per wavenumber. The traction along n loads each component by
+// n[axis]. The compliance is the mean over all directions q, as in a round contact.
 double six_link_face(const Eigen::Matrix3d& block, double across) {
   const Eigen::Vector3d n = block.row(2);
   double sum = 0.0;
@@ -55,21 +56,21 @@ double six_link_face(const Eigen::Matrix3d& block, double across) {
       sum += n[axis] * n[axis] / std::sqrt(nn * qq - nq * nq) / kSteps;
     }
   }
-  return 2 / sum;  // contact modulus, Young's 1
+  return 2 / sum;  // for a Young's modulus of 1
 }
 
-// An oblique face of the hull of voxels is a field of teeth. Which voxels the ball pushes: the outermost
-// plane alone, or every voxel of the teeth, down to their feet, as one surface.
+// The voxels of an oblique face form teeth. The ball pushes either only the outermost plane of voxels, or all
+// voxels of the teeth, down to their feet, as one surface.
 enum class Touched { outermost, surface };
 
-// A block 2·half wide and `height` tall, in spacings, base held, and on its top a shallow ball whose Hertzian
-// contact radius is `a` spacings. The voxels' hull, in the mean, is the block. Returns the force over the
-// depth, in units of kYoung and spacings.
+// Presses a shallow ball with Hertz's contact radius `a` into the top of a block with a held base. The block
+// is 2·half wide and `height` tall. On average, the hull of the voxels is the block's surface. Lengths are in
+// spacings. Returns the force divided by the depth, in units of kYoung and spacings.
 double pressed(const Eigen::Matrix3d& block, Energy energy, Touched touched, double poisson, double a,
                double half, double height) {
   const Eigen::Vector3d up = block.row(2);
-  // For the faces named above, planes of the lattice parallel to the top are `plane` apart; teeth are `teeth`
-  // high, and in the mean the hull lies half of that inside the outermost voxels.
+  // For these orientations, the lattice planes parallel to the top are `plane` apart. The teeth are `teeth`
+  // high, and on average the hull lies half a tooth inside the outermost voxels.
   const double plane = up.cwiseAbs().maxCoeff(), teeth = up.cwiseAbs().sum() - plane;
   const double inside = 0.5 * teeth, top = height + inside, skin = touched == Touched::surface ? teeth : 0.0;
   const auto margin = [&](int row) { return 0.5 * block.row(row).cwiseAbs().sum(); };
@@ -79,7 +80,7 @@ double pressed(const Eigen::Matrix3d& block, Energy energy, Touched touched, dou
                         glm::dvec3(1.0),
                         std::vector<int>(static_cast<std::size_t>(n) * n * n, 0),
                         {{}, {kYoung, poisson}}};
-  // A voxel of the top plane lies on the block's axis.
+  // The offset puts a voxel of the top plane onto the block's axis.
   const auto in_block = [&](int i, int j, int k) -> Eigen::Vector3d {
     return block * Eigen::Vector3d(i - reach, j - reach, k - reach) +
            Eigen::Vector3d(0, 0, top - std::floor(0.5 * height / plane) * plane);
@@ -154,13 +155,15 @@ TEST(Oblique, BlocksAreAsStiffAsAlongTheLattice) {
       std::cout << (accurate ? "accurate | " : "six-link | ") << o.name << std::showpos << " | "
                 << percent(surface / along);
       if (accurate) {
-        // Teeth give way: a ball that pushes their tips alone is another contact, and only stated.
+        // Teeth give way, so a ball that pushes only their tips is a different contact. Its result is only
+        // printed.
         std::cout << " % | tips alone "
                   << percent(pressed(o.frame, energy, Touched::outermost, poisson, 6, 16, 20) / along);
         EXPECT_NEAR(surface, along, 0.05 * along) << o.name;
       } else {
         std::cout << " % | half-space " << percent(six_link_face(o.frame, across) / (2 * std::sqrt(across)));
-        // Softer in bulk as well as at the surface: stretched along (111), a block is half as stiff.
+        // The six-link block is softer in bulk as well as at the surface. Stretched along (111), it is half
+        // as stiff.
         EXPECT_NEAR(surface, along, 0.35 * along) << o.name;
       }
       std::cout << std::noshowpos << " %\n";

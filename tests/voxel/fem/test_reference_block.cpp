@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Both energies against a finite-element solution at the same spacing.
+// Both soft energies against a finite-element solution at the same spacing.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -22,7 +22,8 @@ TEST(ReferenceBlock, TheSixLinkEnergyIsWithinTenPercentWhereHomogeneous) {
     if (row.material == "hom" && row.spacings() > 3.9) {
       EXPECT_LT(std::fabs(error), 0.1);
     }
-    // No bar elsewhere: a punch of two spacings, layers and inclusions are stated in voxel/README.md.
+    // The other cases have only a coarse bound. voxel/README.md states the errors for a punch of two
+    // spacings, for layers and for inclusions.
     EXPECT_LT(std::fabs(error), 0.25);
   }
 }
@@ -40,8 +41,9 @@ TEST(ReferenceBlock, TheAccurateEnergyIsTheFiniteElements) {
   std::cout << "accurate | every row | within " << 100 * worst << " %\n";
 }
 
-// Nearly incompressible: what locks in volume is far too stiff on a coarse grid and falls with its spacing.
-// Without locking the spacing matters as little as at ν 0.3, 3 %.
+// A nearly incompressible block. Elements that lock in volume would be far too stiff on a coarse grid, and
+// less so at a smaller spacing. Without locking, the spacing matters as little as at ν = 0.3, where it is 3
+// %.
 TEST(ReferenceBlock, TheAccurateEnergyDoesNotLockInVolume) {
   const tests::ReferenceRow coarse{"hom", 0.005, 0.04, 0.499, 0.0}, fine{"hom", 0.0025, 0.04, 0.499, 0.0};
   const double at_coarse = tests::pressed_block(coarse, Energy::accurate),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lattice and its couplings against the voxels around a link looked at one by one, closed forms, and a
-// brute-force surface.
+// The lattice and its couplings, against the voxels around each link one by one, against closed forms, and
+// against a brute-force surface.
 #include "voxel/lattice/lattice.h"
 
 #include <gtest/gtest.h>
@@ -67,8 +67,8 @@ TEST(Lattice, SpringsAreThoseOfTheLinksAroundThem) {
   }
 }
 
-// Volumes with whole rows inside a label, others where labels meet in the middle or at one end of a row or
-// along its edges only, and a hole.
+// A volume with many kinds of row. Some lie inside one label. In others, labels meet in the middle, at one
+// end or only along the edges. There is also a hole.
 LabelVolume wide_volume() {
   LabelVolume volume = block({140, 11, 9}, {1e-3, 1.2e-3, 0.9e-3});
   for (int k = 0; k < 9; ++k) {
@@ -85,15 +85,15 @@ LabelVolume wide_volume() {
   return volume;
 }
 
-// What inner loops and single voxels are given is what the lattice says, to the last bit, in whatever order
-// rows are asked for; and a coarse link is half the four below it.
+// The springs of inner loops and of single voxels equal the lattice's springs to the last bit, in whatever
+// order rows are prepared. A coarse link is half as stiff as the four links below it together.
 TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
   LatticeOptions options = made_of(elastic(1e4, 0.3));
   options.materials[2] = elastic(5e3, 0.45);
   options.materials[3] = elastic(1e6, 0.0);
   options.materials[4] = elastic(2e3, 0.2);
   const Lattice lattice(wide_volume(), options);
-  // Every row asked for on the way up, or only those of the level looked at.
+  // In `known`, all rows of all levels are prepared. In `unknown`, rows are prepared only by the queries.
   std::vector<std::unique_ptr<LevelStiffness>> known, unknown;
   for (int level = 0; level < 4; ++level) {
     for (auto* levels : {&known, &unknown})
@@ -133,7 +133,7 @@ TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
     const auto ul = static_cast<std::size_t>(level);
     const voxel::Grid& g = known[ul]->grid();
     const int size = 1 << level;
-    // All of them here; of the other, those of this level alone, once.
+    // `known` has all rows of this level. `alone` prepares only the queried rows of this level.
     LevelStiffness alone(lattice, unknown[ul - 1].get());
     const auto sum_of = [&](const std::array<int, 3>& cell, std::size_t d) {
       double sum = 0.0;
@@ -174,7 +174,8 @@ TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
 }
 
 TEST(Lattice, AnUnequalSpacingIsTheSameMaterial) {
-  // A bar of n links, pulled at its ends, has stiffness E·A/L whatever the spacing along and across it.
+  // A bar of n links that is pulled at its ends has the stiffness E·A/L, whatever the spacings along and
+  // across it.
   for (const glm::dvec3& h :
        {glm::dvec3(1e-3), glm::dvec3(2e-3, 1e-3, 0.5e-3), glm::dvec3(0.3e-3, 1e-3, 4e-3)}) {
     for (int d = 0; d < 3; ++d) {
@@ -205,7 +206,7 @@ TEST(Lattice, LimitsOfALinkAreTheMeanOfItsTwoHalves) {
         if (!lattice.filled(w)) continue;
         const LinkMaterial &a = scene.options.materials[lattice.label(v)],
                            &b = scene.options.materials[lattice.label(w)];
-        // Each half link may become min·h/2 short and max·h/2 long, and slip by shear·h/2.
+        // Each half link may shorten to min·h/2, lengthen to max·h/2, and slip sideways by shear·h/2.
         const double low = (a.stretch_min + b.stretch_min) * h[d] / 2 - h[d],
                      high = (a.stretch_max + b.stretch_max) * h[d] / 2 - h[d],
                      slip = (a.shear + b.shear) * h[d] / 2;
@@ -258,7 +259,7 @@ TEST(Lattice, TheSurfaceIsWhatMissesANeighbour) {
 
 TEST(Lattice, AnchorsByFaceLabelAndVoxel) {
   LabelVolume volume = block({5, 4, 6}, glm::dvec3(1e-3));
-  // The outermost layer is that of the voxels, not of the volume around them.
+  // The anchored layer is the outermost layer of voxels, not of the volume, which is larger.
   for (int j = 0; j < 4; ++j) {
     for (int i = 0; i < 5; ++i) volume.labels[volume.index(i, j, 0)] = 0;
   }
@@ -297,11 +298,11 @@ TEST(Lattice, AnchorsByFaceLabelAndVoxel) {
   EXPECT_EQ(anchored(options), (std::set<std::array<int, 3>>{{2, 2, 4}}));
   options.anchor_labels = {};
   options.anchor_voxels = {volume.index(1, 2, 3), volume.index(4, 3, 5),
-                           volume.index(0, 0, 0)};  // the last is empty
+                           volume.index(0, 0, 0)};  // the last voxel is empty
   EXPECT_EQ(anchored(options), (std::set<std::array<int, 3>>{{1, 2, 3}, {4, 3, 5}}));
 }
 
-// Rows without an anchor, with nothing but anchors, and with some, in any order.
+// Rows with no anchors, with only anchors, and with some anchors, in random order.
 TEST(Lattice, KnowsEachAnchor) {
   tests::Random random(21);
   for (int n = 0; n < 12; ++n) {
@@ -351,7 +352,7 @@ TEST(Lattice, RefusesInWords) {
   elsewhere.anchor_labels = {7};
   EXPECT_NE(refusal(volume, elsewhere).find("anchor"), std::string::npos);
 
-  // Its size is looked at before a byte is allocated or a label read.
+  // The volume's size is checked before memory is allocated and before labels are read.
   LabelVolume huge;
   huge.dims = {2000, 2000, 2000};
   EXPECT_NE(refusal(huge, made_of(LinkMaterial{})).find("coarser"), std::string::npos);
@@ -392,7 +393,7 @@ TEST(Lattice, RefusesInWords) {
     EXPECT_NE(text.find(row.says), std::string::npos) << text;
     EXPECT_NE(text.find("label 1"), std::string::npos) << text;
   }
-  // A material that no voxel is made of is nobody's business.
+  // A material that no voxel has is not checked.
   LatticeOptions unused = made_of(LinkMaterial{});
   unused.materials[2].young_Pa = -1.0;
   EXPECT_EQ(refusal(volume, unused), "");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Arrays that take memory where they are written: what they say that they take, and what a copy holds.
+// Arrays that take memory only where they are written: the memory that they report, and their copies.
 #include "voxel/lattice/lazy_array.h"
 
 #include <gtest/gtest.h>
@@ -20,13 +20,13 @@ using tests::kMemoryIsOurs;
 using tests::own_bytes;
 using voxel::LazyArray;
 
-constexpr std::size_t kPages = 6000;  // more than are asked for at once
+constexpr std::size_t kPages = 6000;  // more than one system call asks for
 
 std::size_t page() {
   return static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-// Writes into `count` pages anywhere, and reads from as many.
+// Writes into `count` random pages, and reads from `count` random pages. Returns the written pages.
 std::set<std::size_t> write_some(LazyArray<std::uint8_t>& array, std::size_t count, std::uint32_t seed) {
   tests::Random random(seed);
   std::set<std::size_t> written;
@@ -58,7 +58,7 @@ TEST(LazyArray, TakesWhatWasWrittenAndNothingForWhatWasRead) {
 
 TEST(LazyArray, ACopyHoldsTheSameAndTakesNoMore) {
   for (const std::size_t count : {std::size_t{0}, std::size_t{700}, kPages}) {
-    LazyArray<std::uint8_t> array(kPages * page() - 5);  // the last page is not whole
+    LazyArray<std::uint8_t> array(kPages * page() - 5);  // the last page is incomplete
     if (count > 0) {
       write_some(array, std::min(count, kPages - 1), 4);
       array[array.size() - 1] = 7;
@@ -69,7 +69,7 @@ TEST(LazyArray, ACopyHoldsTheSameAndTakesNoMore) {
   }
 }
 
-// Pages that a child of the process shares look to the system as those do that were only read.
+// The system reports pages that a child process shares in the same way as pages that were only read.
 TEST(LazyArray, IsCopiedWholeWhileAChildSharesIt) {
   LazyArray<std::uint8_t> array(kPages * page());
   const std::size_t written = write_some(array, 500, 5).size();
@@ -80,7 +80,7 @@ TEST(LazyArray, IsCopiedWholeWhileAChildSharesIt) {
   if (child == 0) {
     char c = 0;
     close(pipe_ends[1]);
-    (void)!read(pipe_ends[0], &c, 1);  // until the parent closes its end
+    (void)!read(pipe_ends[0], &c, 1);  // returns when the parent closes its end
     _exit(0);
   }
   close(pipe_ends[0]);
@@ -96,7 +96,8 @@ TEST(LazyArray, IsCopiedWholeWhileAChildSharesIt) {
 TEST(LazyArray, AVectorTakesWhatOfItsRoomIsUsed) {
   std::vector<std::uint32_t> numbers;
   numbers.reserve(4 * kPages * page());
-  EXPECT_LE(voxel::resident_bytes(numbers), 2 * page());  // beside what else the library keeps there
+  EXPECT_LE(voxel::resident_bytes(numbers),
+            2 * page());  // allows for other data of the memory allocator in these pages
   numbers.resize(kPages * page() / sizeof(std::uint32_t), 1U);
   EXPECT_NEAR(static_cast<double>(voxel::resident_bytes(numbers)), static_cast<double>(kPages * page()),
               static_cast<double>(2 * page()));
@@ -106,7 +107,7 @@ TEST(LazyArray, WhatIsGivenBackIsZeroAgain) {
   LazyArray<std::uint8_t> array(kPages * page());
   array.populate();
   std::fill(array.begin(), array.end(), std::uint8_t{1});
-  // Whole pages within go, what shares one with something else stays.
+  // Only pages that lie completely within the range are given back.
   voxel::give_back(array.data() + 100, 10 * page());
   EXPECT_EQ(array.resident_bytes(), (kPages - 9) * page());
   EXPECT_EQ(array[page() - 1], 1);

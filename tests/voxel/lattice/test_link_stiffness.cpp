@@ -15,7 +15,7 @@ using voxel::link_moduli;
 using voxel::link_weight;
 using voxel::LinkModuli;
 
-// Bits of the parallels that a predicate on (p, q) keeps.
+// The bits of the parallel links (p, q) for which keep(p, q) is true.
 template <typename Keep>
 constexpr std::uint32_t parallels(Keep keep) {
   std::uint32_t out = 0;
@@ -36,7 +36,7 @@ TEST(LinkWeight, IsTheShareOfItsAreaThatLiesWithin) {
 
 TEST(LinkWeight, KeepsTheThicknessOfWhatHasNoInside) {
   EXPECT_EQ(link_weight(parallels([](int, int q) { return q == 0; })), 1.0);              // a sheet
-  EXPECT_EQ(link_weight(parallels([](int p, int q) { return q == 0 && p <= 0; })), 0.5);  // its border
+  EXPECT_EQ(link_weight(parallels([](int p, int q) { return q == 0 && p <= 0; })), 0.5);  // a sheet's border
   EXPECT_EQ(link_weight(parallels([](int, int) { return false; })), 1.0);                 // a row of voxels
   EXPECT_EQ(link_weight(parallels([](int p, int q) { return p == 0 || q == 0; })), 1.0);  // sheets that cross
 }
@@ -100,16 +100,17 @@ TEST(LinkModuli, OfAStiffSheetInSoftTissueAreTheSheets) {
   std::array<LinkModuli, 9> links{};
   for (std::size_t n = 0; n < 9; ++n) links[n] = n / 3 == 1 ? skin : fat;
   EXPECT_EQ(link_moduli(links).along_Pa, 1e6);
-  // Two voxels thick: each carries half of the cell between them and half of the fat beside it.
+  // Skin that is two voxels thick. Each layer of links carries half of the skin between the layers and half
+  // of the fat beside it.
   for (std::size_t n = 6; n < 9; ++n) links[n] = skin;
   EXPECT_DOUBLE_EQ(link_moduli(links).along_Pa, 0.5 * 1e6 + 0.5 * 1e3);
-  // In the plane where a stiff half meets a soft one.
+  // A link in the plane where stiff tissue meets soft tissue.
   for (std::size_t n = 0; n < 9; ++n) links[n] = n >= 3 ? skin : fat;
   EXPECT_DOUBLE_EQ(link_moduli(links).across_Pa, 0.5 * 3e5 + 0.5 * 3e2);
 }
 
-// The two energies live in the same cells: stretched as a whole along an axis, at ν 0, any body takes the
-// same energy in both, whatever its edges and notches, its thin parts and materials that meet at a corner.
+// Both soft energies are sums over the same cells. So a uniform stretch along an axis at ν = 0 takes the same
+// energy in both, whatever the body's edges, notches, thin parts and materials.
 TEST(LinkModuli, AgreeWithTheBricksOnUniformStretch) {
   constexpr int n = 7;
   std::mt19937 random(5);
@@ -149,7 +150,7 @@ TEST(LinkModuli, AgreeWithTheBricksOnUniformStretch) {
   }
 }
 
-// A sheet one voxel thick that stands on a block has no bricks: its links hold it to the block's voxels.
+// A sheet one voxel thick that stands on a block has no bricks. Its links hold it to the block's voxels.
 TEST(LinkModuli, ASheetOnABlockIsHeldInTheAccurateEnergy) {
   constexpr int n = 7, nz = 8;
   tests::VoxelBody body{{n, n, nz}, glm::dvec3(1e-3), std::vector<int>(n * n * nz, 0), {{}, {1e4, 0.3}}};
@@ -167,18 +168,18 @@ TEST(LinkModuli, ASheetOnABlockIsHeldInTheAccurateEnergy) {
     problem.u[body.at(i, 3, nz - 1)] = {0.0, 1e-4, 1e-4};
   }
   ASSERT_TRUE(problem.solve(1e-10));
-  // Five links long and seven wide, the outermost half: in tension they are six in parallel, the block below
-  // softer.
+  // The sheet is five links high and seven wide. The outermost links count half, so six links act in
+  // parallel. `alone` is the sheet's energy on a rigid base; the block below is softer.
   const double alone = 0.5 * 6.0 * 1e4 * 1e-3 / 5.0 * 1e-8;
   EXPECT_LT(problem.energy_J(), 3.0 * alone);
   EXPECT_GT(problem.energy_J(), 0.3 * alone);
-  // What it was pulled to spreads all the way down.
+  // The upward displacement extends all the way down.
   for (int k = 1; k < nz; ++k)
     EXPECT_GT(problem.u[body.at(3, 3, k)].z(), problem.u[body.at(3, 3, k - 1)].z()) << k;
 }
 
-// Turned by an angle, as a whole: bricks know small rotations and feel 1 − cos θ as strain in two
-// directions, 1.5 % at 10 degrees; links feel sin θ across.
+// The energy of a rigid rotation by θ. Bricks are exact for small rotations only: they have a strain of 1 −
+// cos θ in two directions, 1.5 % at 10 degrees. Six links also have the shear sin θ across them.
 TEST(LinkModuli, RotationsCostWhatTheyDo) {
   constexpr int n = 4;
   const tests::VoxelBody body{{n, n, n}, glm::dvec3(1e-3), std::vector<int>(n * n * n, 1), {{}, {1e4, 0.0}}};

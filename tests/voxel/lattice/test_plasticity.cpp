@@ -23,7 +23,7 @@ TEST(Yield, IsElasticUpToItsStrainAndPerfectlyPlasticBeyond) {
     const auto gone = plastic_link(side * 5e-4, 0.0, y);
     EXPECT_DOUBLE_EQ(gone.elastic, side * y);
     EXPECT_DOUBLE_EQ(gone.offset, side * 3e-4);
-    // Unloaded, it is at rest where its offset is; loaded again as far, nothing is new.
+    // Unloaded, the link is at rest at its offset. Loading it again as far does not change the offset.
     EXPECT_EQ(plastic_link(gone.offset, gone.offset, y).elastic, 0.0);
     EXPECT_NEAR(plastic_link(side * 5e-4, gone.offset, y).offset, gone.offset, 1e-19);
   }
@@ -43,7 +43,7 @@ TEST(Yield, LeavesNoLimitOfTheChain) {
     EXPECT_GE(link.offset, std::min(before, difference) - 1e-7F);
     EXPECT_LE(link.offset, std::max(before, difference) + 1e-7F);
     EXPECT_LE(std::fabs(link.elastic), yield);
-    // Twice the same is once, but for the last place of a strain of up to 2.
+    // A second evaluation changes nothing, except the last digit of a difference of up to 2.
     const auto again = plastic_link(difference, link.offset, yield);
     EXPECT_NEAR(again.offset, link.offset, 2.4e-7F);
   }
@@ -60,8 +60,7 @@ TEST(Yield, ForceIsTheSlopeOfItsEnergy) {
   }
 }
 
-// However many steps, as long as they only load, the offset is that of one; and after a turn, that of the
-// turn.
+// The offset after loading does not depend on the number of steps. The same holds after a reversal.
 TEST(Yield, IsTheSameForAnyNumberOfSteps) {
   const double y = 1e-4;
   for (const int steps : {1, 7, 1000}) {
@@ -77,8 +76,7 @@ TEST(Yield, IsTheSameForAnyNumberOfSteps) {
   }
 }
 
-// A round trip of a link costs what the closed form of perfect plasticity says: 4·k·y·(amplitude − y) a
-// cycle.
+// A cycle of a link dissipates the energy of the closed form of perfect plasticity, 4·k·y·(amplitude − y).
 TEST(Yield, SpendsTheAreaOfItsLoop) {
   const double k = 30.0, y = 1e-4, amplitude = 5e-4;
   double offset = 0.0, work = 0.0, last = 0.0, last_force = 0.0;
@@ -98,8 +96,8 @@ TEST(Yield, SpendsTheAreaOfItsLoop) {
   EXPECT_NEAR(work, 4 * k * y * (amplitude - y), 1e-3 * work);
 }
 
-// A bar: links in a row between a wall and a hand. Gauss-Seidel on the energy of the step; each voxel goes to
-// the place where its two links' forces are equal, found by bisection.
+// A bar of links in a row between a wall and a hand. sweep() is Gauss-Seidel on the energy of the step:
+// bisection finds, for each voxel, the place where the forces of its two links are equal.
 struct Bar {
   std::vector<double> k, y, offset, u;
 
@@ -121,7 +119,8 @@ struct Bar {
     for (std::size_t l = 0; l < k.size(); ++l)
       offset[l] = plastic_link(u[l + 1] - u[l], offset[l], y[l]).offset;
   }
-  // The hand goes there; the offsets move when the bar has settled, or with every sweep.
+  // Moves the hand to `to`. The offsets are updated once the bar has settled, and also after each sweep if
+  // `keep_on_the_way`.
   void pull(double to, int sweeps, bool keep_on_the_way = false) {
     u.back() = to;
     for (int s = 0; s < sweeps; ++s) {
@@ -132,8 +131,8 @@ struct Bar {
   }
 };
 
-// Links of 10, 20 and 40 N/m in a row, each of which yields at a strain of its own; the weakest, at 3 N,
-// takes all.
+// Links of 10, 20 and 40 N/m in a row yield at 5, 3 and 8 N. The weakest link takes all of the plastic
+// elongation.
 TEST(Yield, ABarKeepsWhatItsWeakestLinkDoes) {
   const std::vector<double> k{10, 20, 40}, y{0.5, 0.15, 0.2};
   const double series = 1 / (1.0 / 10 + 1.0 / 20 + 1.0 / 40), weakest = 3.0;
@@ -145,7 +144,7 @@ TEST(Yield, ABarKeepsWhatItsWeakestLinkDoes) {
       EXPECT_NEAR(bar.offset[1], 1.0 - weakest / series, 1e-9);
       EXPECT_EQ(bar.offset[0], 0.0);
       EXPECT_EQ(bar.offset[2], 0.0);
-      // Let go: pulled back until no force is left, it is longer by just that.
+      // The bar is moved back until its force is 0. It is longer by exactly the offset of the weakest link.
       bar.pull(1.0 - weakest / series, sweeps);
       EXPECT_NEAR(bar.force(0), 0.0, 1e-9);
       EXPECT_NEAR(bar.offset[1], 1.0 - weakest / series, 1e-9);
@@ -153,11 +152,11 @@ TEST(Yield, ABarKeepsWhatItsWeakestLinkDoes) {
   }
 }
 
-// Why the offset waits: just after a pull all of the strain is in the last link.
+// Shows why offsets are updated only at rest: just after a pull, all of the elongation is in the last link.
 TEST(Yield, OffsetsKeptOnTheWayKeepTheWayToo) {
   const std::vector<double> k(8, 10.0), y(8, 0.2);
   Bar waits(k, y), hurries(k, y);
-  waits.pull(1.2, 3000);  // 0.15 a link: nothing yields
+  waits.pull(1.2, 3000);  // 0.15 per link, so no link yields
   hurries.pull(1.2, 3000, true);
   for (const double p : waits.offset) EXPECT_EQ(p, 0.0);
   EXPECT_GT(hurries.offset.back(), 0.1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boundary springs of coarse cells, and the error that a cycle leaves.
+// Boundary springs of coarse cells, and the error that remains after a multigrid cycle.
 #include "voxel/multigrid/boundary_springs.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ struct Levels {
       pointers.push_back(levels.back().get());
     }
   }
-  // Spring of a cell (N/m).
+  // Boundary spring of a cell on one axis (N/m).
   double hold(BoundarySprings& holds, int level, VoxelId cell, int axis) {
     const voxel::VoxelSprings springs = pointers[static_cast<std::size_t>(level)]->springs_of(cell);
     if (!holds.any(level, cell / voxel::kRow)) return 0.0;
@@ -55,8 +55,8 @@ struct Levels {
   std::vector<LevelStiffness*> pointers;
 };
 
-// On level l a fixed plane is (2^l − 1) / 2 voxel links from the middle of a cell, with 4^l links side by
-// side. From either side, along each axis.
+// On level l, a fixed plane is (2^l − 1) / 2 voxel links away from the centre of a cell, and 4^l links lie
+// side by side.
 TEST(BoundarySprings, APlaneStaysWhereItIsOnEveryLevel) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -78,7 +78,7 @@ TEST(BoundarySprings, APlaneStaysWhereItIsOnEveryLevel) {
   }
 }
 
-// Only what is held now counts, whatever was held before.
+// The springs depend only on the voxels that are held now, not on those held before.
 TEST(BoundarySprings, DependOnWhatIsHeldAlone) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -125,8 +125,8 @@ TEST(BoundarySprings, DependOnWhatIsHeldAlone) {
   }
 }
 
-// The time and order of queries changes nothing, nor does what is held in between: springs of anchors are the
-// same, to the last bit, as if all were found at the start.
+// The springs of anchors do not depend on when and in which order they are queried, or on the voxels that are
+// held in between. They are the same to the last bit as if all were computed at the start.
 TEST(BoundarySprings, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
   std::mt19937 random(9);
   for (int n = 0; n < 6; ++n) {
@@ -136,7 +136,7 @@ TEST(BoundarySprings, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
     options.materials[2] = elastic(3e5, 0.2);
     options.anchor_labels = {2};
     for (std::uint8_t& label : volume.labels) label = random() % 9 == 0 ? 0 : 1;
-    for (int piece = 0; piece < 3; ++piece) {  // of bone, of any size
+    for (int piece = 0; piece < 3; ++piece) {  // boxes of bone of any size
       std::array<int, 3> low{}, high{};
       for (std::size_t d = 0; d < 3; ++d) {
         low[d] = static_cast<int>(random() % static_cast<unsigned>(volume.dims[d]));
@@ -192,7 +192,7 @@ TEST(BoundarySprings, OfAnchorsAreTheSameWheneverTheyAreAskedFor) {
   }
 }
 
-// Voxels that slide on an inclined surface fix the cells above them along its normal only.
+// Voxels that slide on an inclined surface fix the coarse cells around them only along the surface's normal.
 TEST(BoundarySprings, WhatSlidesHoldsAlongItsNormalAlone) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -204,7 +204,7 @@ TEST(BoundarySprings, WhatSlidesHoldsAlongItsNormalAlone) {
   const voxel::Spring link = lattice.spring_within(1, 2);
   const VoxelId cell = levels.pointers[1]->grid().at(6, 5, 8);
   const auto k = [&link](int axis) { return 8.0 * static_cast<double>(link.on(axis, 2)); };
-  double compliance = 0.0;  // along the normal, of the springs of all axes in series
+  double compliance = 0.0;  // along the normal, with the springs of all axes in series (m/N)
   for (int axis = 0; axis < 3; ++axis) compliance += static_cast<double>(n[axis] * n[axis]) / k(axis);
   for (const BoundarySprings::Support::By by :
        {BoundarySprings::Support::By::obstacle, BoundarySprings::Support::By::tool}) {
@@ -228,7 +228,8 @@ TEST(BoundarySprings, WhatSlidesHoldsAlongItsNormalAlone) {
   }
 }
 
-// However surfaces are inclined, a boundary spring never pushes a cell on.
+// A boundary spring never pushes a cell away from rest, however surfaces are inclined: its matrix is positive
+// semidefinite.
 TEST(BoundarySprings, NeverPush) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);
@@ -272,8 +273,9 @@ TEST(BoundarySprings, NeverPush) {
   EXPECT_GT(tilted, 50);
 }
 
-// Six cycles over a block that was bent as a whole and is to come back to 0: the mean fraction of the error's
-// energy that a cycle leaves. A patch of its surface is held, or slides as on a ball.
+// Runs six cycles on a block with a smooth initial displacement whose solution is 0. Returns the mean factor
+// by which a cycle reduces the error in the energy norm. A patch of the surface is held, or slides as on a
+// ball.
 enum class Patch : std::uint8_t { held, slides };
 double left_by_a_cycle(const std::array<int, 3>& dims, int patch, Patch by = Patch::held) {
   LatticeOptions options;
@@ -337,7 +339,8 @@ TEST(BoundarySprings, ACycleLeavesAsLittleOfTheErrorAtAnySize) {
     std::cout << size << " voxels an edge: " << left << '\n';
     EXPECT_LT(left, 0.3) << size;
   }
-  for (const int size : {9, 17, 33, 61}) {  // some levels, or all, have a cell of one layer
+  for (const int size :
+       {9, 17, 33, 61}) {  // on some levels or all, an outermost cell has only one layer of finer cells
     const double left = left_by_a_cycle({size, size, size}, 0);
     std::cout << size << " voxels an edge: " << left << '\n';
     EXPECT_LT(left, 0.45) << size;
@@ -353,8 +356,8 @@ TEST(BoundarySprings, ACycleRoundWhatTheToolHoldsLeavesNoMore) {
   }
 }
 
-// The same for a patch that is small beside the block, of which coarse levels see little, and for one that
-// slides.
+// The same for a patch that is small compared with the block, so that coarse levels hardly resolve it, and
+// for a sliding patch.
 TEST(BoundarySprings, ACycleRoundASmallOrSlidingPatchLeavesNoMore) {
   for (const int size : {48, 96}) {
     for (const Patch by : {Patch::held, Patch::slides}) {

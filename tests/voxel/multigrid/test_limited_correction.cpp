@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Limited corrections of many rows, against their definition.
+// Corrections of many rows that the links' limits clip, against their definition.
 #include "voxel/multigrid/limited_correction.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using voxel::Lattice;
 using voxel::RowId;
 using voxel::VoxelId;
 
-// A lattice that was pulled: many of its links are at their limits, and none is beyond.
+// A lattice whose state was pulled. Many of its links are at their limits, and none is beyond them.
 struct Pulled {
   tests::RandomScene scene;
   Lattice lattice;
@@ -39,7 +39,7 @@ struct Pulled {
   }
 };
 
-// not anchored, and linked to something
+// Whether the voxel is not anchored and has a link.
 bool moves(const Lattice& lattice, VoxelId v) {
   if (!lattice.filled(v) || lattice.anchored(v)) return false;
   for (int d = 0; d < 3; ++d) {

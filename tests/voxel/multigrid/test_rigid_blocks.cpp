@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid blocks in and on soft tissue, against a direct solution in which each block is one unknown an axis.
+// Rigid blocks in and on soft tissue, against a direct solution in which each block is one unknown per axis.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using voxel::VoxelId;
 constexpr double kSpacing = 1e-3;
 constexpr voxel::LinkMaterial kTight{.stretch_min = 1.0, .stretch_max = 1.0, .shear = 0.0};
 
-// A block anchored below; `tight(i, j, k)`: label 2, without slack.
+// A block of tissue that is anchored below. Voxels with tight(i, j, k) get label 2, a material without slack.
 struct Scene {
   voxel::LabelVolume volume;
   voxel::LatticeOptions options;
@@ -47,7 +47,7 @@ struct Scene {
     object = std::make_unique<voxel::SoftObject>(lattice);
   }
 
-  // A tool `depth` spacings below first contact with the top, at x, y in spacings.
+  // A tool at x, y that is `depth` below its first contact with the top. All arguments are in spacings.
   [[nodiscard]] voxel::ToolInBody ball(double radius, double depth, double x, double y) const {
     voxel::ToolInBody tool;
     tool.radius = radius * kSpacing;
@@ -79,7 +79,8 @@ struct Scene {
     }
     return worst / kSpacing;
   }
-  // Relaxes in turns, as a session does: `ticks` ticks with the tool there.
+  // Runs `ticks` ticks with the tool at one place. Tick and shadow relax the object in turns, as in a
+  // session.
   enum class Relaxed { here, by_another_thread };
   void hold(voxel::ShadowObject& shadow, const voxel::ToolInBody& tool, int ticks,
             Relaxed relaxed = Relaxed::here) {
@@ -113,7 +114,7 @@ struct Scene {
   }
 };
 
-// The equilibrium on an axis, with pressed voxels where they are and each rigid block as one unknown.
+// The equilibrium problem on an axis. Pressed voxels keep their places, and each rigid block is one unknown.
 tests::Problem condensed(const Scene& scene, int axis, const voxel::ToolInBody& tool) {
   const voxel::Lattice& lattice = *scene.lattice;
   const auto& u = scene.object->state().u[static_cast<std::size_t>(axis)];
@@ -146,7 +147,7 @@ tests::Problem condensed(const Scene& scene, int axis, const voxel::ToolInBody& 
   return p;
 }
 
-// Force on the anchors in such a solution (N), if none of their links is at its limit.
+// Force on the anchors in the solution `p` (N). Expects that none of the anchors' links is at its limit.
 double carried(const Scene& scene, const tests::Problem& p) {
   double force = 0.0;
   for (const tests::Link& l : p.links) {
@@ -160,7 +161,8 @@ double carried(const Scene& scene, const tests::Problem& p) {
 
 enum class Limits { none, active };
 
-// Force and displacements are those of the direct solution, and the residual of all that may move is small.
+// Expects the force and displacements of the direct solution, and small residuals on all free voxels and
+// blocks.
 void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits limits) {
   scene.touch(tool);
   scene.object->push_out(tool);
@@ -176,8 +178,8 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
       tests::solve_with_limits(p, kSpacing);
     }
     EXPECT_NEAR(-force[axis], carried(scene, p), 0.01 * size) << "axis " << axis;
-    // Across the press, pressed voxels with links at their limits do not slide as far as they could, with
-    // blocks or without (tangential_contact.h).
+    // If links are at their limits, pressed voxels do not slide as far sideways as they could, with or
+    // without blocks (tangential_contact.h).
     if (limits == Limits::active && axis != 2) continue;
     double off = 0.0;
     for (std::size_t v = 0; v < p.u.size(); ++v)
@@ -188,7 +190,7 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
   }
   EXPECT_EQ(voxel::validate(*scene.lattice, scene.object->state(), 8.0), "");
   if (limits == Limits::active) return;
-  // what is left of the first-order conditions, on each voxel that may move and on each block
+  // residual of the first-order conditions on each free voxel and on each block
   std::map<int, glm::dvec3> of_part;
   double most = 0.0;
   for (std::size_t i = 0; i < scene.lattice->size(); ++i) {
@@ -213,7 +215,7 @@ void expect_at_equilibrium(Scene& scene, const voxel::ToolInBody& tool, Limits l
   EXPECT_LT(most, 1e-4 * size);
 }
 
-// All is back at rest when the tool has gone.
+// Expects that the object returns to its undeformed state once the tool has left.
 void expect_restored(Scene& scene, voxel::ShadowObject& shadow, voxel::ToolInBody tool, int ticks = 150) {
   tool.centre.z += 1.0;
   scene.hold(shadow, tool, ticks);
@@ -242,7 +244,7 @@ const std::array<Shape, 4>& shapes() {
 }
 
 TEST(RigidBlocks, AreWhatHangsTogetherAndAtAnchorsAreAnchored) {
-  // Two plates, one of them on the anchors.
+  // Two rigid plates, one of which lies on the anchors.
   const Scene scene({8, 7, 9}, kLoose, [](int, int, int k) { return k < 2 || k >= 6; });
   EXPECT_EQ(scene.lattice->block_count(), 1U);
   EXPECT_EQ(scene.lattice->anchored_count(), 2U * 8 * 7);
@@ -262,7 +264,7 @@ TEST(RigidBlocks, OnAnchorsAreAsRigid) {
   EXPECT_GT(scene.object->give_way(tool, bounds), 0U);
 }
 
-// wherever the tool is: over the middle, beside it, and moving from one place to another
+// The tool is over the middle, moves sideways, and rests beside the middle.
 TEST(RigidBlocks, AreFeltAsTheyAreHeldByTissue) {
   for (const Shape& shape : shapes()) {
     SCOPED_TRACE(shape.name);
@@ -294,7 +296,7 @@ TEST(RigidBlocks, AreFeltThroughLinksAtTheirLimits) {
   }
 }
 
-// small blocks, and some that sprawl between them, with links at their limits beside the tool
+// Many small blocks, and some that extend between the others.
 TEST(RigidBlocks, ScatteredAreFeltToo) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     SCOPED_TRACE(seed);

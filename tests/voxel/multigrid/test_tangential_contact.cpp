@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pressed voxels slide on the tool as a part of relaxation.
+// Relaxation lets pressed voxels slide on the tool's surface.
 #include "voxel/multigrid/tangential_contact.h"
 
 #include <gtest/gtest.h>
@@ -25,8 +25,8 @@ using voxel::VoxelId;
 
 constexpr double kH = 2e-3;  // spacing (m)
 
-// One voxel on an inclined surface, with random neighbours: it moves to the point without tangential force,
-// without leaving the surface, and its energy falls by the work on the way.
+// One voxel on an inclined surface, with random displacements of its neighbours. It moves along the surface,
+// in the direction of the force, to the point without tangential force.
 TEST(Sliding, GoesToTheLeastEnergyAlongTheTool) {
   const Lattice lattice(tests::block({6, 6, 6}, glm::dvec3(kH)), tests::made_of(elastic(1e4, 0.3)));
   LevelStiffness couplings(lattice, nullptr);
@@ -55,7 +55,7 @@ TEST(Sliding, GoesToTheLeastEnergyAlongTheTool) {
   }
 }
 
-// A voxel at its limit on one axis does not leave the surface by moving along the others.
+// A voxel at its limit on one axis does not move along the others, because it would leave the surface.
 TEST(Sliding, StaysWhereLinksKeepIt) {
   const voxel::LinkMaterial tied{.young_Pa = 1e4, .stretch_min = 0.99, .stretch_max = 1.01, .shear = 0.01};
   const Lattice lattice(tests::block({6, 6, 6}, glm::dvec3(kH)), tests::made_of(tied));
@@ -71,8 +71,8 @@ TEST(Sliding, StaysWhereLinksKeepIt) {
   EXPECT_EQ(state.at(v), glm::dvec3(0.0));
 }
 
-// A ball at rest in a block moves on by a tenth of a spacing: the error of the force after so many whole
-// cycles, over the step of the force.
+// A ball at rest in a block moves further by `step` spacings. Returns the error of the force after `cycles`
+// whole cycles, relative to the change of the force.
 double left_after(int cycles, int edge, double radius, double depth, double step) {
   const auto force_at = [&](SoftBlock& soft, double deep) {
     return soft.press(soft.ball(radius * kH, deep * kH), (radius + 4.0) * kH, 1e-6, 400).force_N.z;
@@ -90,7 +90,7 @@ double left_after(int cycles, int edge, double radius, double depth, double step
   return std::fabs((soft.object->reaction(tool).force_N.z - to) / (to - from));
 }
 
-// A contact that slides during cycles converges like the rest of the object.
+// A contact that slides during cycles converges as fast as the rest of the object.
 TEST(Sliding, AContactComesToRestWithAllElse) {
   const double steep = left_after(6, 24, 4.0, 3.0, -0.1), flat = left_after(6, 24, 10.0, 1.0, 0.1),
                deep = left_after(6, 32, 8.0, 6.0, 0.05);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Newtons from Young's modulus and Poisson's ratio: Hertz's ball, the flat punch, and a finite-element block,
-// through a whole block of soft tissue with its store and relaxation. The energies alone are tested in
-// test_half_space.cpp and test_reference_block.cpp.
+// Forces from Young's modulus and Poisson's ratio, against Hertz's ball, the flat punch and a finite-element
+// block. These tests use a complete block of soft tissue with its storage and relaxation. test_half_space.cpp
+// and test_reference_block.cpp test the energies alone.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ double contact_modulus(double poisson) {
   return kYoung / (1 - poisson * poisson);
 }
 
-// Runs cycles until the force on the held voxels is constant; returns that force, upwards.
+// Runs cycles until the force on the held voxels is constant. Returns this force, upwards (N).
 double relaxed_force(SoftBlock& soft, const std::vector<VoxelId>& held, double part = 1e-4) {
   double before = 0.0;
   for (int cycle = 0; cycle < 60; ++cycle) {
@@ -43,8 +43,8 @@ double relaxed_force(SoftBlock& soft, const std::vector<VoxelId>& held, double p
   return before;
 }
 
-// A quarter of a block 20 contact radii wide, pressed at the edge of its two inner faces. A face of the
-// lattice is a plane of symmetry, because links in it count half.
+// A quarter of a block that is 20 contact radii wide. It is pressed at the edge where its two inner faces
+// meet. These faces act as planes of symmetry, because links in a face of the lattice count half.
 struct Corner {
   SoftBlock soft;
   std::vector<VoxelId> held;
@@ -64,7 +64,7 @@ struct Corner {
       }
     }
   }
-  // Reaction of the whole block on a tool at the voxels' present places.
+  // Reaction of the whole block on a tool, with the voxels at their present places.
   Reaction felt(const voxel::ToolInBody& tool) {
     for (const VoxelId v : held) soft.object->release(v);
     soft.object->touch(held);
@@ -79,7 +79,7 @@ struct Felt {
   double force_N, theory_N, radius;
 };
 
-// A ball with contact radius a (in voxel centres); its depth is a tenth of a spacing.
+// Presses a ball with a contact radius of `a` spacings. Its depth is a tenth of a spacing.
 Felt ball(double a, double poisson) {
   const double depth = 0.1 * kH, radius = a * a * kH * kH / depth;
   Corner corner(a, poisson);
@@ -95,7 +95,7 @@ Felt ball(double a, double poisson) {
   for (std::size_t n = 0; n < corner.held.size(); ++n)
     corner.soft.object->move(corner.held[n], {0.0, 0.0, bottom(corner.radius2[n]) + nudge});
   relaxed_force(corner.soft, corner.held);
-  // pressed voxels only push, and no other voxel lies in the ball
+  // repeated until all held voxels push and no other voxel lies in the ball
   for (int round = 0; round < 6; ++round) {
     std::size_t changed = 0;
     for (std::size_t n = corner.held.size(); n-- > 0;) {
@@ -139,7 +139,8 @@ Felt punch(double a, double poisson) {
   tool.radius = (a + 1e-3) * kH;
   tool.centre = {0.0, 0.0, corner.soft.top() + corner.soft.object->voxel_radius() - depth};
   const double found = corner.felt(tool).force_N.z;
-  // voxels of the whole punch: those on a face count half, the one on the edge a quarter
+  // number of voxels of the whole punch: a voxel inside the quarter stands for four, one on a face for two,
+  // the one on the edge for one
   double voxels = 0.0;
   for (const VoxelId v : corner.held) {
     const auto c = corner.soft.lattice->coordinates(v);
@@ -157,7 +158,7 @@ void compare(const char* what, double poisson, const Felt& felt) {
       << what << ' ' << felt.radius << ' ' << poisson;
 }
 
-// under a sanitizer only the small block: it looks for errors, not accuracy
+// Under a sanitizer only the small block runs, because the run looks for memory errors, not for accuracy.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 const std::vector<double> kRadii{4.0};
 #else
@@ -176,8 +177,8 @@ TEST(Calibration, AFlatPunchIsTheHalfSpaces) {
   }
 }
 
-// The reference is a block of 100 × 100 × 60 mm with its base held and a square punch on top
-// (reference/README.md), with a voxel at each of its nodes.
+// Force on a square punch on a block of 100 × 100 × 60 mm with a held base (N). The block has a voxel at each
+// node of the reference (reference/README.md).
 double pressed_square(const tests::ReferenceRow& row) {
   const double h = row.spacing_m, depth = 1e-3;
   const int n = static_cast<int>(std::lround(0.1 / h)) + 1, nz = static_cast<int>(std::lround(0.06 / h)) + 1;
@@ -212,7 +213,7 @@ TEST(Calibration, ABlockIsTheFiniteElements) {
       ++homogeneous;
       EXPECT_LT(std::fabs(error), 0.1);
     }
-    // the same energy by the plain solver, within a tenth of a percent
+    // The plain solver of the same energy must agree within 0.1 %.
     if (row.spacing_m > 0.004) {
       EXPECT_NEAR(error, tests::pressed_block(row, tests::Energy::six_link) / row.force_N - 1.0, 0.001);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Energy that a contact returns, for springs whose force is not the gradient of an energy.
+// The energy that a contact returns, if the tissue's force is not the gradient of an energy.
 #include "voxel/object/contact_energy_observer.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 namespace {
 
-// Tissue whose force along z is a power of the depth, and which is stiffer towards x = 0.
+// Tissue whose force along z is a power of the depth. It is stiffer towards x = 0.
 struct Tissue {
   double power, stiffer_per_m;
   [[nodiscard]] glm::dvec3 force_N(const glm::dvec3& tool) const {
@@ -24,7 +24,7 @@ struct Hand {
   glm::dvec3 at{0.0}, felt_N{0.0};
   double gained_J = 0.0, given_J = 0.0, most_taken_N = 0.0;
 
-  // Straight there, in ticks of step_m.
+  // Moves the hand straight to `to`, by `step_m` per tick.
   void go(const glm::dvec3& to, double step_m) {
     const glm::dvec3 from = at;
     const int ticks = static_cast<int>(std::ceil(glm::distance(from, to) / step_m));
@@ -57,9 +57,10 @@ TEST(ContactEnergy, WhatGoesInComesOutWhole) {
   }
 }
 
-// In where it is soft, out where it is stiff, repeatedly: no energy is gained, and no step is felt.
+// The tool goes in where the tissue is soft and out where it is stiff, repeatedly. It must gain no energy.
 TEST(ContactEnergy, ATissueThatIsStifferWhereAToolLeavesGivesNothing) {
-  for (const double stiffer : {1.0, 2.0, 4.0}) {  // per meter: 0.5, 1 and 2 % along the sideways path
+  for (const double stiffer :
+       {1.0, 2.0, 4.0}) {  // per meter; the stiffness changes by 0.5, 1 and 2 % along the sideways path
     Hand hand{{2.0, stiffer}, {}};
     hand.energy.begin();
     for (int press = 0; press < 4; ++press) {
@@ -85,7 +86,7 @@ TEST(ContactEnergy, PressingOnRegainsTheForce) {
   EXPECT_GT(hand.energy.share(), 0.99);
 }
 
-// A contact that exists when a session begins has its stored energy.
+// A contact that exists when a session begins may return its stored energy.
 TEST(ContactEnergy, WhatIsThereAtTheBeginningMayBeGiven) {
   Hand hand{{2.0, 0.0}, {}, {0.0, 0.0, -3e-3}};
   hand.energy.begin();

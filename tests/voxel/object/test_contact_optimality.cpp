@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Does a contact come to rest at the least energy within limits? By the first-order conditions (Karush, Kuhn
-// and Tucker): forces of links at their limits and of the tool, each with the right sign, balance the
-// springs' force on every voxel. The test finds these forces itself.
+// Does a contact come to rest at the least energy within the limits? The test checks the first-order
+// conditions (Karush, Kuhn and Tucker). On every voxel, the springs' force must be balanced by forces of the
+// tool and of links at their limits, each with the right sign. The test computes these multipliers itself.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,9 +16,10 @@ namespace {
 
 using voxel::VoxelId;
 
-// An admissible force: along `way` at one voxel, and against it at another if it is a link's.
+// An admissible force. It acts along `way` at one voxel. A link's force also acts against `way` at the link's
+// other voxel.
 struct Force {
-  std::size_t a = 0, b = kNone;  // 3 v + axis for links; 3 v for the tool
+  std::size_t a = 0, b = kNone;  // 3 v for voxel v; b: kNone for the tool
   glm::dvec3 way{0.0};
   double size_N = 0.0;
   static constexpr std::size_t kNone = ~std::size_t{0};
@@ -41,7 +42,8 @@ class Conditions {
     }
   }
 
-  // Largest force on a voxel that admissible forces do not balance (N): least squares, one force at a time.
+  // Fits the admissible forces by least squares, one force at a time. Returns the largest residual force on a
+  // voxel (N).
   double least_left_N() {
     for (int n = 0; n < kRounds; ++n) {
       for (Force& f : forces_) balance(f);
@@ -54,7 +56,7 @@ class Conditions {
   [[nodiscard]] std::size_t forces() const { return forces_.size(); }
 
  private:
-  static constexpr double kAtTool = 1e-3, kAtLimit = 1e-3;  // of the spacing
+  static constexpr double kAtTool = 1e-3, kAtLimit = 1e-3;  // in spacings
   static constexpr int kRounds = 20'000;
 
   void add_link(VoxelId v, int d) {
@@ -99,11 +101,11 @@ class Conditions {
   }
 
   const tests::SoftBlock& soft_;
-  std::vector<double> left_N_;  // [3 v + axis]
+  std::vector<double> left_N_;  // [3 v + axis] residual force
   std::vector<Force> forces_;
 };
 
-class AtLimits : public testing::TestWithParam<double> {};  // depth in spacings
+class AtLimits : public testing::TestWithParam<double> {};  // parameter: depth in spacings
 
 TEST_P(AtLimits, WhatABallPressesComesToItsLeastEnergy) {
   const voxel::LinkMaterial material{

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two soft blocks in contact share the overlap, and press with equal and opposite force.
+// Two soft blocks in contact share their overlap, and press on one another with equal and opposite forces.
 #include "voxel/object/facet_contact.h"
 
 #include <gtest/gtest.h>
@@ -27,8 +27,8 @@ using voxel::VoxelId;
 
 constexpr double kH = 1e-3;
 
-// The lower block stands on its base; the upper one hangs from its top, over the lower one and `overlap` into
-// it.
+// The lower block is anchored at its base. The upper block is anchored at its top, and overlaps the lower
+// block by `overlap` (m).
 struct Stack {
   std::array<int, 3> dims;
   std::shared_ptr<const Lattice> lattice_below, lattice_above;
@@ -55,13 +55,13 @@ struct Stack {
       }
     }
     for (const PressedPair& pair : pairs) {
-      // surfaces of single voxels have no direction
+      // a surface of a single voxel has no normal
       if (pair.side != glm::dvec3(0.0)) voxel::claim_pair({below, pose_below}, {above, pose_above}, pair);
     }
   }
 
-  // Sweeps over the pairs, with a background cycle of each object, as ticks do. Returns the deepest overlap
-  // left.
+  // Runs sweeps over the pairs, each followed by a background cycle of both objects, as ticks do. Returns the
+  // deepest remaining overlap (m).
   double relax(int rounds) {
     double deepest = 0.0;
     for (int n = 0; n < rounds; ++n) {
@@ -83,9 +83,9 @@ struct Stack {
   }
 };
 
-// Stiffness of a bar of width × width voxels in whole links: nine for 4 × 4 voxels, because a bar ends at the
-// centres of its outermost voxels, where links count half, and a quarter at its edges. One for a row of
-// single voxels, which has no inside.
+// Number of whole links that are as stiff as a bar of width × width voxels. The bar ends at the centres of
+// its outermost voxels. So links on its faces count half and those on its edges a quarter: 4 × 4 voxels give
+// nine. A row of single voxels has no inside and gives one.
 double links_side_by_side(int width) {
   double sum = 0.0;
   for (int j = 0; j < width; ++j) {
@@ -107,8 +107,8 @@ TEST(PairContact, ForcesAreEqualAndOpposite) {
   oblique.rotation = glm::normalize(glm::dquat(0.8, 0.3, -0.4, 0.2));
   for (const BodyPose& frame : {BodyPose{}, oblique}) {
     for (const auto& [young_below, young_above] : {std::pair{1e4, 1e4}, {1e4, 3e4}, {5e4, 5e3}}) {
-      // single columns only in the aligned frame: one ball on another slips sideways unless rounding is
-      // symmetric
+      // Single columns are tested only in the aligned frame. In other frames rounding is not symmetric, and
+      // one voxel's ball slips sideways off the other.
       for (const int width : {frame.origin == glm::dvec3(0.0) ? 1 : 3, 5}) {
         Stack stack({width, width, 7}, young_below, young_above, 0.8 * kH, frame);
         const double deepest = stack.relax(400);
@@ -119,7 +119,8 @@ TEST(PairContact, ForcesAreEqualAndOpposite) {
           worst = std::max(worst, glm::length(fb + fa) / glm::length(fb));
           total += fb;
         }
-        // Two bars end to end, compressed by the overlap: six links each, of E·h times their area.
+        // Two bars of six links each, end to end, are compressed by the overlap. A whole link has the
+        // stiffness E·h.
         const double k = 1.0 / (6 / (young_below * kH) + 6 / (young_above * kH));
         const double expected = k * 0.8 * kH * links_side_by_side(width);
         const double force = glm::dot(total, frame.rotation * glm::dvec3(0, 0, 1));
@@ -129,7 +130,7 @@ TEST(PairContact, ForcesAreEqualAndOpposite) {
         EXPECT_LE(worst, 0.01);
         EXPECT_LE(deepest, 0.05 * kH);
         EXPECT_NEAR(force, expected, 0.01 * expected);
-        // overlap is shared in proportion to compliance
+        // the overlap is shared in proportion to the compliances
         const PressedPair& middle = stack.pairs[stack.pairs.size() / 2];
         const double down = -stack.below.state().at(middle.a).z, up = stack.above.state().at(middle.b).z;
         EXPECT_NEAR(down / up, young_above / young_below, 0.02 * young_above / young_below);
@@ -167,7 +168,8 @@ TEST(PairContact, AVoxelBetweenFourIsHeldByAllOfThem) {
 }
 
 TEST(PairContact, ChainsFollowWhatLinksCannot) {
-  // each voxel may come 0.95 of a spacing nearer to the one behind it; the rest is left to those behind
+  // Each voxel may come 0.95 spacings nearer to the voxel behind it. The voxels behind must give way for the
+  // rest.
   Stack stack({3, 3, 4}, 1e4, 2e4, 2.4 * kH);
   const voxel::PosedObject below{stack.below, stack.pose_below}, above{stack.above, stack.pose_above};
   for (PressedPair& pair : stack.pairs) EXPECT_LT(stack.press(pair), -0.4 * kH);
@@ -182,7 +184,7 @@ TEST(PairContact, ChainsFollowWhatLinksCannot) {
 }
 
 TEST(PairContact, OverlapIsSharedInverselyToStiffnessAtOnce) {
-  // in the first step already, before anything else moved
+  // The first step already shares the overlap, before other voxels have moved.
   Stack stack({1, 1, 2}, 1e4, 4e4, 0.5 * kH);
   PressedPair& pair = stack.pairs[0];
   EXPECT_NEAR(stack.press(pair), 0.0, 1e-9);
@@ -204,7 +206,7 @@ TEST(PairContact, VoxelsThatPassedOneAnotherAreNotHeldThere) {
   Stack stack({3, 3, 5}, 1e4, 1e4, -0.5 * kH);
   PressedPair& pair = stack.pairs[4];
   EXPECT_NEAR(pair.side.z, 1.0, 1e-12);
-  stack.above.move(pair.b, {0.0, 0.0, -1.9 * kH});  // below the surface that it should be above
+  stack.above.move(pair.b, {0.0, 0.0, -1.9 * kH});  // below the surface, although it belongs above it
   ASSERT_LT(stack.above.state().at(pair.b).z, -1.6 * kH);
   EXPECT_NEAR(stack.press(pair), 0.5 * kH, 1e-9);
   EXPECT_EQ(pair.force_N, glm::dvec3(0.0));
@@ -212,7 +214,7 @@ TEST(PairContact, VoxelsThatPassedOneAnotherAreNotHeldThere) {
 }
 
 TEST(PairContact, AnAnchoredVoxelDoesNotGiveWay) {
-  // The lower block is one layer, all anchored: the upper one takes the whole overlap.
+  // The lower block is a single anchored layer. So the upper block takes the whole overlap.
   Stack stack({1, 1, 1}, 1e4, 1e4, 0.0);
   auto tall = std::make_shared<Lattice>(block({1, 1, 4}, glm::dvec3(kH)), made_of(elastic(1e4, 0.3), "+z"));
   SoftObject above(tall);

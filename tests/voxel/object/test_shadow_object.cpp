@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asynchronous relaxation reaches the same rest, never raises the energy, and violates no limit, whatever the
-// tick does meanwhile.
+// Asynchronous relaxation reaches the same equilibrium, never raises the energy, and violates no limit,
+// whatever the tick does meanwhile.
 #include "voxel/object/shadow_object.h"
 
 #include <gtest/gtest.h>
@@ -24,12 +24,13 @@ constexpr double kH = 1e-3;  // spacing (m)
 constexpr LinkMaterial kFirm{
     .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
 
-// Bound on the violation of limits, in roundings of the largest displacement. The chain tolerates 3.5, so
-// that waves do not run for roundings; a limit and both ends of its link are rounded once each. Five is the
-// most in 25 sequences of 400 ticks, always from the chain; it does not grow.
+// Bound on the violation of limits, in float roundings of the largest displacement. The chain tolerates 3.5
+// roundings, so that no wave starts because of rounding. The limit and both ends of its link are rounded once
+// each. In 25 sequences of 400 ticks, the largest violation was 5 roundings. It came from the chain and did
+// not grow.
 constexpr double kRoundings = 6.0;
 
-// One exchange, with `rows` rows a tick.
+// One exchange with the shadow, which applies `rows` far rows per tick.
 void exchange(ShadowObject& shadow, SoftBlock& soft, std::size_t rows) {
   shadow.submit(*soft.object);
   shadow.relax();
@@ -76,7 +77,8 @@ TEST(ShadowObject, AHeldContactComesToTheSameRest) {
   }
 }
 
-// Without end: the two solvers find parts of one motion, not the same motion twice.
+// The contact stays at rest for any number of exchanges. The two solvers must each find a part of the motion,
+// and not both the same part.
 TEST(ShadowObject, AHeldContactStaysAtRest) {
   SoftBlock soft({41, 37, 25}, kH, kFirm);
   ShadowObject shadow(*soft.object);
@@ -100,9 +102,9 @@ TEST(ShadowObject, AHeldContactStaysAtRest) {
   EXPECT_LT(*high - *low, 1e-3 * felt.back());
 }
 
-// A result that is applied in parts while the tool is still: nothing has a residual in between, so the force
-// changes in even steps and ends where one step would take it. Pressed so little that no limit is active:
-// under active limits the outcome depends on the steps.
+// A result is applied in parts while the tool is still. The force changes in even steps, because relaxation
+// finds no residual in between. It ends where a single step would end. The depth is so small that no limit is
+// active, because under active limits the result depends on the steps.
 TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
   constexpr int parts = 8;
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
@@ -134,7 +136,7 @@ TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
     if (soft == &whole) after = now;
     felt.push_back(now);
   }
-  felt.erase(felt.begin());  // of the result applied at once
+  felt.erase(felt.begin());  // the force after the result that was applied at once
   const double step = (after - before) / parts;
   ASSERT_EQ(felt.size(), static_cast<std::size_t>(parts));
   EXPECT_LT(after, 0.99 * before) << "a result that changes something";
@@ -143,7 +145,8 @@ TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
   EXPECT_LT(largest_difference(*whole.object, *some.object), 0.01 * kH);
 }
 
-// A result that is cut short, because the tool moves, is applied as a whole.
+// If the tool moves, the remaining parts of a result are applied at once, so that the whole result is
+// applied.
 TEST(ShadowObject, AResultInPartsThatIsCutShortHasComeWhole) {
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
   for (SoftBlock* soft : {&whole, &some}) {
@@ -178,8 +181,8 @@ TEST(ShadowObject, WhatTheToolLeftComesToRestAndIsLeftAlone) {
   EXPECT_LT(most, 1e-3 * kH);
 }
 
-// Ten spacings deep, in steps and without a cycle between them, as after a jump of the tool: everything that
-// moved is at its limits, and has spacings to go.
+// Presses ten spacings deep, in steps without a cycle between them, as after a jump of the tool. All links
+// that moved are at their limits, and their voxels are spacings away from equilibrium.
 ToolInBody press_at_once(SoftBlock& soft) {
   ToolInBody tool;
   constexpr int steps = 40;
@@ -213,7 +216,8 @@ TEST(ShadowObject, AJumpIsFeltRightAfterThreeResults) {
   }
 }
 
-// A result moves rows by spacings; none can go before its neighbours, and yet all arrive.
+// A result moves rows by whole spacings. No row can move before its neighbours, but all rows reach their
+// places.
 TEST(ShadowObject, WhatMovesFarIsAddedWhole) {
   for (const LinkMaterial& material : {LinkMaterial{}, kLoose}) {
     SoftBlock soft(kWide, kH, material);
@@ -234,7 +238,7 @@ TEST(ShadowObject, WhatMovesFarIsAddedWhole) {
   }
 }
 
-// Far from the contact small changes are deferred; at rest both states are the same.
+// Small changes far from the contact are deferred. At rest, the object and its shadow have the same state.
 TEST(ShadowObject, DeferredChangesArePassedOnAtRest) {
   SoftBlock soft({41, 65, 65}, kH, elastic(1e4, 0.3));
   ShadowObject shadow(*soft.object);
@@ -252,14 +256,15 @@ TEST(ShadowObject, DeferredChangesArePassedOnAtRest) {
   EXPECT_LT(most, voxel::kRestingResidual * kH);
 }
 
-// Applying a result takes longer than the time to the next submission. Rows that a tick moves meanwhile are
-// submitted with their motion to come, and must not make it twice. The block is released and comes to rest.
+// Applying a result takes longer than the time until the next submission. Rows that a tick moves meanwhile
+// are submitted together with their pending motion, and must not move by it twice. The block is released and
+// comes to rest.
 TEST(ShadowObject, RowsSubmittedWhileAResultIsAppliedMoveOnce) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
   ShadowObject shadow(*soft.object);
   press_and_let_go(shadow, soft);
   const double first = soft.object->energy_J();
-  // marks rows dirty by a motion of 0, so that they are submitted each time
+  // A move by 0 marks the row dirty, so that it is submitted each time.
   const voxel::VoxelId dirty = soft.lattice->grid().at(20, 18, 12);
   for (int n = 0; n < 40; ++n) {
     shadow.submit(*soft.object);
@@ -276,9 +281,8 @@ TEST(ShadowObject, RowsSubmittedWhileAResultIsAppliedMoveOnce) {
   EXPECT_LT(soft.object->energy_J(), 1e-6 * first);
 }
 
-// The tool is still; the tick runs contact cycles and the shadow its own, on a state that is some ticks old.
-// Which voxels are pressed changes, so energies are compared without the tool's work: with the same pressed
-// voxels at the same places.
+// The tool is still. The tick runs contact cycles, and the shadow relaxes a state that is some ticks old.
+// push_out() runs only once, before the first submission, so that the tool does no work later.
 TEST(ShadowObject, TheSumNeverHasMoreEnergyThanTheSubmission) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock soft({41, 37, 25}, kH, material);
@@ -308,7 +312,8 @@ TEST(ShadowObject, TheSumNeverHasMoreEnergyThanTheSubmission) {
   }
 }
 
-// A tool that moves on while results are old, deep in tissue at its limits: limits hold after every part.
+// A tool moves deep in tissue at its limits, while the shadow's results are old. The limits hold after every
+// applied part.
 TEST(ShadowObject, NoLinkLeavesItsLimitsInBetween) {
   SoftBlock soft({31, 29, 19}, kH, kFirm);
   ShadowObject shadow(*soft.object);

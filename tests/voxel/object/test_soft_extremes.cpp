@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One soft object with one setting at its extreme: pressed, stroked and released. Every number is finite, no
-// link is beyond its limits, and the object comes to rest. `hybrid stability --extremes` runs the same scenes
-// as whole sessions.
+// A soft object with one setting at its extreme is pressed, stroked and released. Every number must be
+// finite, no link may exceed its limits, and the object must come to rest. `hybrid stability --extremes` runs
+// the same scenes as whole sessions.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,14 +27,15 @@ struct Extreme {
   std::array<int, 3> dims{11, 11, 8};
   double spacing = 1e-3;
   LinkMaterial material{};
-  double depth = 1.0;          // spacings
-  glm::dvec3 anisotropy{1.0};  // of the spacing
+  double depth = 1.0;          // in units of `spacing`
+  glm::dvec3 anisotropy{1.0};  // factors of the spacing on each axis
   bool held_at_sides = false;
 };
 
 struct Outcome {
   bool finite = true;
-  double violation_spacings = 0.0;  // worst link, of the largest displacement
+  double violation_spacings =
+      0.0;  // largest violation of a limit, relative to the largest displacement or one spacing
   double most_force_N = 0.0;
   double left_spacings = 0.0;  // displacement left at the end
   bool asleep = false;
@@ -123,7 +124,7 @@ TEST(SoftExtremes, NoSlackAtAllMovesNothing) {
   EXPECT_EQ(o.left_spacings, 0.0);
 }
 
-// Voxels without slack along one axis and with slack along the others move as rows and layers.
+// Links without slack along them but with slack across, or the reverse. Voxels then move as rows or layers.
 TEST(SoftExtremes, SlackOneWayOnly) {
   expect_rest({.name = "none along", .material = of(1.0, 1.0, 0.6)});
   for (const double slack : {1e-4, 1e-2}) {
@@ -132,8 +133,8 @@ TEST(SoftExtremes, SlackOneWayOnly) {
   expect_rest({.name = "0.01 along", .material = of(0.99, 1.01, 0.6)});
 }
 
-// With nearly no slack, clusters take so many steps from limit to limit that they are left where the tool
-// left them; nothing else is wrong.
+// If there is nearly no slack in one way, clusters would need very many steps from limit to limit. So they
+// stay where the tool left them, but all other conditions hold.
 TEST(SoftExtremes, HardlyAnySlackOneWayOnlyIsKeptWithinItsLimits) {
   for (const LinkMaterial& material : {of(0.4, 1.6, 0.0), of(0.4, 1.6, 1e-6), of(1.0 - 1e-6, 1.0 + 1e-6, 0.6),
                                        of(1.0 - 1e-4, 1.0 + 1e-4, 0.6)}) {
@@ -162,7 +163,7 @@ TEST(SoftExtremes, Spacing) {
       {.name = "slices ten times as far apart", .material = of(0.4, 1.6, 0.6), .anisotropy = {1, 1, 10}});
 }
 
-// With twice the stiffness or twice the spacing only the force differs.
+// The force is proportional to Young's modulus and to the square of the spacing. All else is equal.
 TEST(SoftExtremes, ForcesScale) {
   const double plain = press_and_leave({.name = "", .material = of(0.4, 1.6, 0.6, 1e4)}).most_force_N;
   for (const double young : {1.0, 1e12}) {
@@ -180,7 +181,7 @@ TEST(SoftExtremes, OneVoxelThick) {
   expect_rest({.name = "a sheet", .dims = {15, 15, 1}, .material = of(0.4, 1.6, 0.6), .held_at_sides = true});
   expect_rest({.name = "a sheet on edge", .dims = {15, 1, 9}, .material = of(0.4, 1.6, 0.6)});
   expect_rest({.name = "a row", .dims = {1, 1, 9}, .material = of(0.4, 1.6, 0.6)});
-  // the whole object is its own bottom layer: it is held, and rigid
+  // the single voxel is its own bottom layer, so it is anchored and rigid
   const Outcome one =
       press_and_leave({.name = "one voxel", .dims = {1, 1, 1}, .material = of(0.4, 1.6, 0.6)});
   EXPECT_TRUE(one.finite && one.asleep);

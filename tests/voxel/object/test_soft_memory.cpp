@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Memory of a soft object: little more than its labels until it is touched, and at any time what
-// memory_bytes() says.
+// Memory of a soft object. It is little more than its labels until it is touched, and always as much as
+// memory_bytes() reports.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -31,7 +31,7 @@ constexpr double kH = 1e-3;  // spacing (m)
 struct Counted {
   std::unique_ptr<SoftObject> object;
   double voxels = 0.0;
-  std::size_t before = 0;  // of the process, before there is an object
+  std::size_t before = 0;  // memory of the process before the object is made (bytes)
 
   Counted(const LabelVolume& volume, const LatticeOptions& options) : before(own_bytes()) {
     object = std::make_unique<SoftObject>(std::make_shared<Lattice>(volume, options));
@@ -49,7 +49,7 @@ LatticeOptions four_tissues(const std::string& face) {
   return options;
 }
 
-// 134 million voxels: one byte each, and at most another fifth for everything else.
+// 134 million voxels take one byte each. Everything else takes at most another 0.2 bytes per voxel.
 TEST(SoftMemory, UntilItIsTouchedA512CubeTakes1Point2BytesAVoxel) {
   if (!kMemoryIsOurs) GTEST_SKIP() << "a sanitizer's own memory is counted";
   if (reading_takes_memory()) GTEST_SKIP() << kReadingTakes;
@@ -61,9 +61,9 @@ TEST(SoftMemory, UntilItIsTouchedA512CubeTakes1Point2BytesAVoxel) {
   EXPECT_NEAR(cube.said(), cube.counted(), 0.005 * cube.counted());
 }
 
-// A smaller object has more surface, at 4 bytes a voxel (0.05), and pages and rows that are not full, the
-// rest of 0.12. It makes no difference which face is anchored, how tissues mix, or whether bone inside is
-// anchored.
+// A smaller object takes up to 0.12 bytes per voxel more. Of these, 0.05 are for its larger share of surface
+// voxels, at 4 bytes each, and the rest is for incomplete pages and rows. The anchored face, the mixture of
+// tissues and anchored bone inside make no difference.
 TEST(SoftMemory, NoAnchorAndNoTissueTakesMuch) {
   if (!kMemoryIsOurs) GTEST_SKIP() << "a sanitizer's own memory is counted";
   if (reading_takes_memory()) GTEST_SKIP() << kReadingTakes;
@@ -88,7 +88,8 @@ TEST(SoftMemory, NoAnchorAndNoTissueTakesMuch) {
 
 TEST(SoftMemory, WhatItSaysIsWhatTheProcessTakesAlsoWhereItIsTouched) {
   if (!kMemoryIsOurs) GTEST_SKIP() << "a sanitizer's own memory is counted";
-  for (const int edge : {64, 160}) {  // all memory at construction, and on first access
+  for (const int edge :
+       {64, 160}) {  // the small one takes all memory at construction, the large one on first access
     const LabelVolume volume = block({edge, edge, edge}, glm::dvec3(kH));
     const Counted cube(volume, four_tissues("-z"));
     EXPECT_NEAR(cube.said(), cube.counted(), 0.03 * cube.counted()) << edge;
@@ -114,7 +115,7 @@ TEST(SoftMemory, WhatItSaysIsWhatTheProcessTakesAlsoWhereItIsTouched) {
   }
 }
 
-// A lattice that takes over its volume is the same, and frees the volume's memory.
+// A lattice that takes over its volume equals one that copies it, and it frees the volume's memory.
 TEST(SoftMemory, AVolumeThatIsGivenAwayGivesItsMemoryBack) {
   LabelVolume volume = block({100, 90, 70}, glm::dvec3(kH));
   tests::Random random(12);

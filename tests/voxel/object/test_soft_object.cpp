@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The reaction against its definition: the derivative of the minimised energy.
+// The reaction against its definition, the derivative of the minimised energy with respect to the tool's
+// place.
 #include "voxel/object/soft_object.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ constexpr double kH = 1e-3;  // spacing of the blocks below (m)
 constexpr LinkMaterial kFirm{
     .young_Pa = 1e4, .poisson = 0.3, .stretch_min = 0.9, .stretch_max = 1.1, .shear = 0.1};
 
-// dE/d(depth) by central difference; the object stays pressed to `depth + step`.
+// dE/d(depth) by a central difference (N). Afterwards the object is pressed to `depth + step`.
 double energy_slope(SoftBlock& soft, double radius, double depth, double step, double range) {
   soft.press(soft.ball(radius, depth - step), range);
   const double less = soft.object->energy_J();
@@ -43,13 +44,14 @@ TEST(SoftObject, ReactionIsTheDerivativeOfTheMinimisedEnergy) {
     std::cout << "depth " << depth << " spacings: reaction " << force << " N, slope of the energy " << slope
               << " N (" << 100 * (force / slope - 1) << " %), " << felt.pressed << " voxels\n";
     EXPECT_NEAR(force, slope, 0.02 * slope);
-    // Ball and block are symmetric, the contact has no friction.
+    // Ball and block are symmetric, and the contact has no friction.
     EXPECT_LT(glm::length(glm::dvec2(felt.force_N)), 1e-3 * force);
   }
 }
 
 TEST(SoftObject, TheTightChainIsFelt) {
-  // With links at their limits the force goes on growing, because the loads of dependents are felt.
+  // With links at their limits the force continues to grow, because the loads of dependent voxels are felt
+  // too.
   SoftBlock soft({21, 21, 15}, kH, kFirm);
   double before = 0.0, worst = 0.0;
   for (const double depth : {0.2, 0.4, 0.6, 0.8, 1.0}) {
@@ -66,7 +68,7 @@ TEST(SoftObject, TheTightChainIsFelt) {
   std::cout << "largest difference " << 100 * worst << " %\n";
 }
 
-// At rest only: the difference tells an object that is not.
+// This holds only at rest. A difference shows that the object is not at rest.
 TEST(SoftObject, AnchorsCarryWhatIsFelt) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock soft({25, 25, 17}, kH, material);
@@ -85,7 +87,8 @@ TEST(SoftObject, AnchorsCarryWhatIsFelt) {
   }
 }
 
-// A link to an anchor at its limit carries a force that its spring does not know.
+// If an anchor's link is at its limit, it carries more than its spring force. Then the force on the anchors
+// is not reported.
 TEST(SoftObject, WhatTightAnchorsCarryIsNotSaid) {
   SoftBlock soft({15, 15, 3}, kH, kFirm);
   soft.press(soft.ball(4 * kH, 0.6 * kH), 8 * kH);
@@ -96,7 +99,7 @@ TEST(SoftObject, NoWorkIsDoneAroundAClosedPath) {
   SoftBlock soft({27, 27, 17}, kH, elastic(1e4, 0.3));
   const double side = 1.0 * kH;
   const int steps = 16;
-  // off the middle and off the lattice, so that nothing cancels by symmetry
+  // The path is not centred and not aligned with the lattice, so that no error cancels by symmetry.
   const glm::dvec3 corner = soft.ball(5 * kH, 1.2 * kH).centre + glm::dvec3(1.3, 0.4, 0.0) * kH;
   ToolInBody tool = soft.ball(5 * kH, 0.0);
   const auto felt_at = [&](const glm::dvec3& place) {
@@ -136,7 +139,7 @@ TEST(SoftObject, ForgetsAToolThatLeft) {
   const double start = largest();
   EXPECT_NEAR(start, 3 * kH, 0.1 * kH);
   soft.object->touch({});
-  // a tick that presses nothing wakes the background itself
+  // The background relaxation needs no extra call to wake it.
   int cycles = 0;
   const auto& relaxation = soft.object->relaxation();
   for (const auto first = relaxation.cycles(); largest() > 0.01 * start && cycles < 200;) {
@@ -150,7 +153,7 @@ TEST(SoftObject, ForgetsAToolThatLeft) {
 }
 
 TEST(SoftObject, WhatCannotGoFurtherPushesTheToolOut) {
-  // five layers of links that give a tenth each: half a spacing in all
+  // Five layers of links shorten by a tenth of a spacing each, which is half a spacing in total.
   SoftBlock soft({9, 9, 6}, kH, kFirm);
   ToolInBody tool = soft.ball(3 * kH, 2 * kH);
   std::array<ToolBound, 256> bounds;
@@ -186,7 +189,7 @@ TEST(SoftObject, WhatIsTiedToAnchorsIsHeldFast) {
   const VoxelId v = soft.lattice->at(4, 4, 5);
   const glm::dvec3 down(0.1, 0.0, -1.0), up(0.0, 0.1, 1.0);
   EXPECT_FALSE(soft.object->is_immovable(v, down));
-  ToolInBody tool = soft.ball(3 * kH, 2 * kH);  // four times as deep as five links of a tenth allow
+  ToolInBody tool = soft.ball(3 * kH, 2 * kH);  // four times the depth that five links of a tenth allow
   soft.touch(tool, 6 * kH);
   soft.object->push_out(tool);
   EXPECT_TRUE(soft.object->is_immovable(v, down));
@@ -208,7 +211,7 @@ TEST(SoftObject, NoToolSlipsBetweenVoxels) {
       soft.touch(tool, 4 * kH);
       soft.object->settle(tool, 1e-4 * soft.lattice->force_scale_N(), 100);
       const double force = soft.object->reaction(tool).force_N.z;
-      // it never loses contact again
+      // A force far below the largest one so far means that the tool slipped between the voxels.
       if (force < 0.8 * most) lost = depth;
       most = std::max(most, force);
     }

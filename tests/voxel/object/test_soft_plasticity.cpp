@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Plasticity of a whole soft object: closed forms in a row of links, and a dent.
+// Plasticity of a whole soft object: a row of links against closed forms, and a dent.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -26,7 +26,7 @@ LinkMaterial yielding(double yield) {
   return m;
 }
 
-// A row of ten voxels on an anchor; the label of the top voxel differs.
+// A row of ten voxels on an anchor. The top voxel has another label.
 struct Column {
   std::shared_ptr<const voxel::Lattice> lattice;
   SoftObject object;
@@ -46,7 +46,7 @@ struct Column {
     for (int n = 0; n < 3000 && !object.asleep(); ++n) object.relax_cycle();
     EXPECT_TRUE(object.asleep());
   }
-  // Upward force on the top voxel when it is held at `u`.
+  // Upward force on the top voxel while it is held at the displacement `u` (N).
   double hold_at(double u) {
     object.claim(top);
     object.move(top, {0.0, 0.0, u});
@@ -67,10 +67,10 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
   Column column(yield, yield);
   EXPECT_NEAR(column.hold_at(-0.9 * most), kStiffness * 0.9 * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), 0.0, 1e-3 * most);
-  // twice the yield strain: half of it stays
+  // at twice the yield strain, half of the strain stays
   EXPECT_NEAR(column.hold_at(-2.0 * most), kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
-  // from there it is elastic as far as it was pressed, and up to yield the other way
+  // from there it is elastic up to the previous depth, and up to yield in the other direction
   EXPECT_NEAR(column.hold_at(-1.5 * most), 0.5 * kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
   EXPECT_NEAR(column.hold_at(1.0 * most), -kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
@@ -80,7 +80,7 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
 TEST(SoftYield, TheWeakestLinkTakesWhatIsBeyond) {
   const double weak = 0.02, pressed = 0.5 * kH;
   Column column(0.2, weak);
-  // eight links stretch by the force at which the ninth yields; that one takes the rest
+  // Eight links stretch by the force at which the ninth yields. The ninth takes the rest.
   EXPECT_NEAR(column.hold_at(-pressed), kStiffness * weak * kH, 2e-3 * kStiffness * weak * kH);
   EXPECT_NEAR(column.let_go(), -(pressed - 9 * weak * kH), 2e-3 * pressed);
 }
@@ -118,10 +118,10 @@ TEST(SoftYield, ABlockKeepsItsDent) {
   EXPECT_GT(dent, 0.2 * first.depth);
   EXPECT_LT(dent, first.depth);
   EXPECT_LE(voxel::worst_violation(*first.soft.lattice, first.soft.object->state()), 1e-8);
-  // the same each time, to the last bit
+  // a second run is the same to the last bit
   EXPECT_EQ(second.press(second.depth), force);
   EXPECT_EQ(second.leave(), dent);
-  // a smaller load than the last one changes nothing
+  // a load below the last one does not change the dent
   const double less = first.press(dent + 0.4 * (first.depth - dent));
   EXPECT_GT(less, 0.0);
   EXPECT_LT(less, 0.9 * force);
@@ -130,7 +130,7 @@ TEST(SoftYield, ABlockKeepsItsDent) {
   EXPECT_NEAR(again, dent, 0.01 * dent);
 }
 
-// A copy has the dent, and goes on like the original.
+// A copy has the dent, and continues like the original.
 TEST(SoftYield, ACopyHasTheDent) {
   Dented dented;
   dented.press(dented.depth);
@@ -143,7 +143,7 @@ TEST(SoftYield, ACopyHasTheDent) {
   EXPECT_NEAR(copy->energy_J(), dented.soft.object->energy_J(), 1e-3 * copy->energy_J());
 }
 
-// Tissue without plasticity has no memory for it.
+// Tissue that cannot yield takes no memory for plasticity.
 TEST(SoftYield, CostsNothingWhereNothingYields) {
   SoftBlock soft(Dented::kSize, kH, tests::elastic(kYoung, 0.3));
   EXPECT_EQ(soft.object->state().plastic.row.size(), 0U);

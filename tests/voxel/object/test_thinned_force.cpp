@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Error of the force through thinning, at equilibrium, against the full object.
+// The error of the force that thinning causes, at equilibrium and against the full object.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,8 +24,8 @@ constexpr double kTissuePa = 1e4;
 struct Block {
   int cover;         // voxels of tissue above the bone
   double ratio;      // modulus of bone over that of tissue
-  bool embedded;     // a slab of bone with tissue around it; else all below the cover is bone
-  int every, shell;  // 0: not thinned
+  bool embedded;     // true: a slab of bone with tissue around it; false: all below the cover is bone
+  int every, shell;  // of ThinningOptions; every 0: not thinned
   int high;          // voxels
 };
 
@@ -105,8 +105,8 @@ double worst_error(const Case& c, int high, const std::vector<std::array<int, 2>
 
 constexpr double kJnd = 0.07;
 
-// A plane of struts right under the surface carries the load, one further down does not: for struts, objects
-// of different height are different objects.
+// A plane of struts right under the surface carries the load, but a plane further down does not. So the
+// height decides where the planes of struts lie, and several heights are tested.
 constexpr std::array<int, 3> kHeights{35, 36, 37};
 
 TEST(ThinnedForce, IsWithinAJustNoticeableDifferenceWithTheDefaultShell) {
@@ -119,8 +119,8 @@ TEST(ThinnedForce, IsWithinAJustNoticeableDifferenceWithAThinShell) {
   EXPECT_LT(worst_error(kShallow, 36, {{3, 1}, {4, 1}, {6, 1}}), kJnd);
 }
 
-// The modulus of the inside is the material's: through a plane within the face of one cube of struts, n links
-// in a row together are as stiff as what they replace.
+// The thinned inside has the modulus of the material. Within one cube of struts, the links through each plane
+// add up. Over n planes in a row, they are as stiff as the links of the full object.
 TEST(ThinnedForce, StrutsAreAsStiffAsWhatTheyStandFor) {
   for (const int n : {2, 3, 4, 6}) {
     LabelVolume v = tests::block({40, 40, 40}, {1e-3, 1.5e-3, 2e-3}, kBone);
@@ -130,10 +130,10 @@ TEST(ThinnedForce, StrutsAreAsStiffAsWhatTheyStandFor) {
         voxel::thin_labels(v, {.labels = {kBone}, .every = n, .shell = 2, .tool_radius_m = 0.1});
     options.materials[thinned.strut_label[kBone]].young_Pa *= n * n;
     const voxel::Lattice thin(thinned.volume, options);
-    const int first = 2 * n, last = first + n;  // a cube well inside
+    const int first = 2 * n, last = first + n;  // a cube of struts far from the surface
     for (int d = 0; d < 3; ++d) {
       std::array<double, 2> along{},
-          across{};  // compliance of the n planes: of the full object, and of struts
+          across{};  // compliance of the n planes in a row: [0] full object, [1] struts
       for (int plane = first; plane < last; ++plane) {
         std::array<double, 2> sum_along{}, sum_across{};
         for (int b = first; b < last; ++b) {
@@ -161,7 +161,7 @@ TEST(ThinnedForce, StrutsAreAsStiffAsWhatTheyStandFor) {
   }
 }
 
-// Every row of the table of thinning, which has the worst of the three heights.
+// Prints every row of the table of thinning. The table gives the worst of the three heights.
 TEST(ThinnedForce, DISABLED_Table) {
   for (const Case& c : {kDeep, kShallow, kUnder, kBare}) {
     for (const int high : kHeights)

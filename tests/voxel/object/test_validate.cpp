@@ -40,7 +40,7 @@ TEST(Validate, SaysWhatIsWrong) {
        [&](Displacement& s) { s.set_role(voxel_at(lattice, 2, 2, 1), Displacement::obstacle); });
 }
 
-// A block pressed tick by tick until its chain is at its limits, with a tool that wanders, and released.
+// A moving tool presses a block tick by tick, until the chain is at its limits. Then the block is released.
 TEST(Validate, FindsNothingWhileATickPresses) {
   constexpr double h = 1e-3;
   tests::SoftBlock soft(

@@ -14,7 +14,7 @@
 
 namespace tests {
 
-// Sets voxel `v` to `u` and holds it there.
+// Sets voxel `v` to the displacement `u` and holds it there.
 inline void hold(voxel::Displacement& state, std::vector<voxel::VoxelId>& held, voxel::VoxelId v,
                  const glm::dvec3& u) {
   state.set(v, u);
@@ -22,7 +22,7 @@ inline void hold(voxel::Displacement& state, std::vector<voxel::VoxelId>& held, 
   held.push_back(v);
 }
 
-// Runs cycles until the object sleeps; returns their number.
+// Runs cycles until the object sleeps. Returns the number of cycles.
 inline int relax(voxel::Relaxation& relaxation, voxel::Displacement& state,
                  const std::vector<voxel::VoxelId>& held, int most = 2000) {
   relaxation.mark_all_dirty();

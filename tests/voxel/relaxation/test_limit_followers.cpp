@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Followers of given voxels, against a search voxel by voxel.
+// Followers of given voxels, against a reference that searches voxel by voxel.
 #include "voxel/relaxation/limit_followers.h"
 
 #include <gtest/gtest.h>
@@ -20,11 +20,11 @@ using voxel::Displacement;
 using voxel::Lattice;
 using voxel::VoxelId;
 
-constexpr float kSearched = 0.1F, kTight = 1e-4F;  // of the spacing, as in the code
+constexpr float kSearched = 0.1F, kTight = 1e-4F;  // in spacings, as in the code under test
 constexpr float kDirtyMotion = 1e-5F;
 constexpr std::size_t kMostRoots = 64;
 
-// How far the link of two neighbours along d is from its limits.
+// Distance of the link between two neighbours along d from its nearer limit (m).
 float room(const Lattice& lattice, const Displacement& state, VoxelId v, VoxelId w, int d, bool up,
            int axis) {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
@@ -41,7 +41,8 @@ float place_of(voxel::Relaxation& relaxation, const Displacement& state, VoxelId
                          static_cast<float>(rest[axis]), state.u[static_cast<std::size_t>(axis)][v]);
 }
 
-// Moves the dependents of `sources`; returns voxels that moved far enough to mark their rows dirty.
+// Reference. Moves the followers of `sources`, and returns the voxels that moved far enough to mark their
+// rows dirty.
 std::set<VoxelId> draw(voxel::Relaxation& relaxation, Displacement& state,
                        const std::vector<VoxelId>& sources, int axis, std::size_t& drawn) {
   const Lattice& lattice = relaxation.couplings().lattice();
@@ -75,8 +76,8 @@ struct Counts {
   std::size_t drawn = 0, moved = 0, most = 0;
 };
 
-// Some voxels of a lattice are pushed so far that others follow, and then moved back a little. `apart`: while
-// a shadow relaxes the object.
+// Pushes some voxels of a lattice so far that others follow, then moves them back a little, and compares.
+// `apart`: the object is relaxed by a shadow at the same time.
 void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
              const std::vector<std::size_t>& filled, bool apart, Random& random, Counts& counts) {
   const Lattice lattice(volume, options);
@@ -102,7 +103,7 @@ void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& opti
   chain.settle(state, sources, moves, {});
   for (const voxel::RowId row : chain.moved_rows()) relaxation.mark_dirty(row);
   if (lattice.has_bricks()) relaxation.multigrid().renew_bricks(state, lattice.grid().rows());
-  // voxels on the tool do not follow, whether they are sources or not
+  // Held voxels must not follow, so the sources at the surface and one other voxel are held.
   for (const VoxelId v : sources) {
     if (lattice.surface_number(v) != Lattice::kNoSurface) state.set_role(v, Displacement::held);
   }
@@ -169,8 +170,8 @@ TEST(LimitFollowers, GoWhereTheyGoVoxelByVoxelInRandomScenes) {
 }
 
 TEST(LimitFollowers, GoOnFromRowToRow) {
-  // wider than a row of 32; of one label (rows share their springs), and of three; up to the greatest number
-  // of followers
+  // Tests objects wider than a row of 32 voxels. They have one label (rows share springs) or three. Some
+  // reach the largest number of followers.
   Random random(22);
   Counts counts;
   for (int n = 0; n < 100; ++n) {

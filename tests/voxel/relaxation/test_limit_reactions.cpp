@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dependents through links at their limits, against a search voxel by voxel.
+// Dependents through links at their limits, against a reference that searches voxel by voxel.
 #include "voxel/relaxation/limit_reactions.h"
 
 #include <gtest/gtest.h>
@@ -19,9 +19,9 @@ using voxel::Displacement;
 using voxel::Lattice;
 using voxel::VoxelId;
 
-constexpr float kTight = 1e-4F;  // of the spacing, as in the code
+constexpr float kTight = 1e-4F;  // in spacings, as in the code under test
 
-// `visit(w, pushed_up, pushed_down)` for the neighbours of v whose links to it are at a limit.
+// Calls visit(w, pushed_up, pushed_down) for each neighbour w of v whose link to v is at a limit.
 template <class Visit>
 void for_tight(const Lattice& lattice, const Displacement& state, VoxelId v, int axis, const Visit& visit) {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
@@ -43,7 +43,8 @@ void for_tight(const Lattice& lattice, const Displacement& state, VoxelId v, int
   }
 }
 
-// Reference. A voxel with a load below rounding may be a dependent or not: there it follows `rows`.
+// Reference. A voxel whose load is within rounding may or may not be a dependent. For such a voxel the result
+// of `rows` is used.
 std::set<VoxelId> looked_for(const Lattice& lattice, voxel::LevelStiffness& couplings,
                              const Displacement& state, const std::vector<VoxelId>& sources, int axis,
                              const voxel::LimitReactions& rows) {
@@ -68,10 +69,10 @@ std::set<VoxelId> looked_for(const Lattice& lattice, voxel::LevelStiffness& coup
 
 struct Counts {
   std::size_t hung = 0, most = 0;
-  int across = 0;  // sets that reach into rows along x without a source
+  int across = 0;  // number of sets that reach, along x, into rows without a source
 };
 
-// Some voxels of a lattice are pushed so far that others follow.
+// Pushes some voxels of a lattice so far that others follow, and compares.
 void compare(const voxel::LabelVolume& volume, const voxel::LatticeOptions& options,
              const std::vector<std::size_t>& filled, Random& random, Counts& counts) {
   const Lattice lattice(volume, options);
@@ -150,7 +151,7 @@ TEST(LimitReactions, AreThoseFoundVoxelByVoxelInRandomScenes) {
 }
 
 TEST(LimitReactions, GoOnFromRowToRow) {
-  // wider than a row of 32; of one label (rows share their springs), and of three
+  // Tests objects wider than a row of 32 voxels. They have one label (rows share springs) or three.
   Random random(12);
   Counts counts;
   for (int n = 0; n < 300; ++n) {
@@ -178,8 +179,8 @@ TEST(LimitReactions, GoOnFromRowToRow) {
 }
 
 TEST(LimitReactions, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
-  // A plate that can only move as a whole, on tissue. No link in it is stretched, so the voxels between the
-  // sources and the tissue have no load of their own.
+  // A plate without slack moves as a whole on tissue. No link in the plate is stretched, so the voxels
+  // between the sources and the tissue have no load of their own.
   voxel::LabelVolume volume = tests::block({40, 10, 8}, glm::dvec3(1e-3));
   for (std::size_t i = 0; i < volume.labels.size(); ++i) {
     if (i >= volume.index(0, 0, 4)) volume.labels[i] = 2;
@@ -198,7 +199,7 @@ TEST(LimitReactions, WhatHasNoSlackHangsOnItAllWhateverPullsIt) {
   rows.gather(couplings, state, root, 2);
   for (std::size_t i = 0; i < volume.labels.size(); ++i)
     EXPECT_EQ(rows.gathered(tests::voxel_of(lattice, volume, i)), volume.labels[i] == 2);
-  // each of the links to the tissue below is compressed by half a spacing
+  // each link to the tissue below is compressed by half a spacing
   double below = 0.0;
   for (int i = 0; i < 40; ++i) {
     for (int j = 0; j < 10; ++j) below += static_cast<double>(lattice.spring(lattice.at(i, j, 3), 2).along);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Relaxation against direct solutions: of the linear problem without active limits, of the quadratic program
-// with them.
+// Relaxation against direct solutions. Without active limits this is the solution of a linear problem, with
+// them that of a quadratic program.
 #include "voxel/relaxation/relaxation.h"
 
 #include <gtest/gtest.h>
@@ -64,7 +64,7 @@ LabelVolume connected_to_origin(LabelVolume volume) {
   return volume;
 }
 
-// Error of the state against the direct solution, over the largest displacement.
+// Largest error of the state against the direct solution, relative to the largest displacement.
 double error_without_limits(const Lattice& lattice, const LatticeOptions& options,
                             const Displacement& state) {
   double worst = 0.0;
@@ -112,17 +112,17 @@ TEST(Relaxation, ConvergesToTheDirectSolutionOnIrregularVolumes) {
             << " cycles\n";
 }
 
-// Displacements are floats: if some links are a hundred times stiffer, rounding of their ends pulls a hundred
-// times harder, and neither residual nor error get as small.
+// A pressed block. Its displacements are floats. If some links are a hundred times stiffer, rounding of their
+// ends causes forces a hundred times larger. Then neither the residual nor the error becomes as small.
 struct Pressed {
   const char* name;
-  double rounding;  // factor against a homogeneous block
+  double rounding;  // factor of the rounding error, relative to a homogeneous block
   LabelVolume volume;
   LatticeOptions options;
 };
 
-// Blocks with a patch of the top pressed in and sheared: homogeneous, layered, with a stiff inclusion, and
-// flat cells.
+// Blocks for a test that presses and shears a patch of the top: homogeneous, layered, with a stiff inclusion,
+// or with flat cells.
 std::vector<Pressed> pressed_blocks() {
   std::vector<Pressed> blocks;
   const auto add = [&](const char* name, const glm::dvec3& spacing, auto label, double rounding = 1.0) {
@@ -176,8 +176,9 @@ TEST(Relaxation, ConvergesToTheDirectSolutionUnderAPressedPatch) {
   }
 }
 
-// Relaxes 60 random scenes from random starts within limits. No link may leave its limits on the way. Returns
-// the largest growth of energy in a cycle, and expects each scene to end with less than it began with.
+// Relaxes 60 random scenes from random starts within limits. No link may leave its limits meanwhile. Returns
+// the largest ratio of the energies after and before a cycle. Expects that each scene ends with at most 6 %
+// of its initial energy.
 double largest_growth(bool limits_act) {
   Random random(22);
   double worst = 0.0;
@@ -193,7 +194,7 @@ double largest_growth(bool limits_act) {
       }
     }
     const Lattice lattice(scene.volume, scene.options);
-    // anywhere within the limits, as the chain leaves it
+    // a random state within the limits, which the chain makes
     Displacement state(lattice);
     voxel::ChainMail chain(lattice);
     for (int pull = 0; pull < 6; ++pull) {
@@ -218,7 +219,7 @@ double largest_growth(bool limits_act) {
       const auto number = relaxation.cycles();
       while (relaxation.cycles() == number) {
         relaxation.run(state, {}, {}, 20'000);
-        // at every moment, not only at the end
+        // limits hold at every moment, not only at the end of a cycle
         EXPECT_LE(voxel::worst_violation(lattice, state), rounding) << "scene " << n << ", cycle " << cycle;
       }
       const double energy = energy_of(lattice, scene.options, state);
@@ -235,8 +236,8 @@ TEST(Relaxation, EnergyNeverGrows) {
   EXPECT_LE(largest_growth(false), 1.0 + 1e-6);
 }
 
-// If links are at their limits a correction is clipped, and a cycle is no longer a descent step: energy may
-// rise for a moment. What holds is that it ends far below its start.
+// If links are at their limits, corrections are clipped and a cycle is no longer a descent step. So the
+// energy may rise for a moment, but it must end far below its start.
 TEST(Relaxation, WithLimitsInTheWayItEndsFarBelowItsStart) {
   EXPECT_LE(largest_growth(true), 1.25);
 }
@@ -259,13 +260,14 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
       }
       return most;
     };
-    // the residual is measured after the first smoothing of a cycle: about what it was before the cycle
+    // The residual is measured after the first smoothing of a cycle. It is about the residual before the
+    // cycle.
     for (int cycle = 0; cycle < 8; ++cycle) {
       const double before = largest_force();
       relaxation.run_cycle(state, {}, held);
       EXPECT_LE(relaxation.residual_N(), 2.0 * before) << p.name;
     }
-    // At rest the reported residual is below the tolerance, and so is the true one.
+    // At rest, the reported residual and the true residual are below the tolerance.
     relax(relaxation, state, held);
     ASSERT_TRUE(relaxation.asleep());
     const double resting = voxel::kRestingResidual * lattice.force_scale_N() * p.rounding;
@@ -275,8 +277,8 @@ TEST(Relaxation, ItsResidualIsTheLargestForceLeft) {
   }
 }
 
-// A porous ball on a thin stem, pressed at its top: weakly attached, so coarse corrections are large. Cells
-// beside a cycle's box have to prolong theirs, too, or energy grows from cycle to cycle.
+// A porous ball on a thin stem, pressed at its top. It is weakly attached, so coarse corrections are large.
+// The coarse cells beside a cycle's box must be prolonged too, or the energy grows from cycle to cycle.
 TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
   constexpr int kSize = 48, kWide = 5;
   LabelVolume volume = block({kSize, kSize, kSize}, glm::dvec3(1e-3));
@@ -329,7 +331,7 @@ TEST(Relaxation, CyclesRoundAContactBetweenTilesEndWhereWholeOnesDo) {
 TEST(Relaxation, WorkIsBoundedAndCutsChangeNoBit) {
   const Pressed p = pressed_blocks()[1];
   const Lattice lattice(p.volume, p.options);
-  // a call may exceed the budget so far by a cycle around one tile, which is not cut
+  // A call may exceed the total budget by a cycle around one tile, which is not interrupted.
   const std::uint64_t a_cycle = 4 * lattice.size();
   Random random(23);
   std::vector<Displacement> ends;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Relaxation in cycles that are split, cut or limited: the same rest as whole cycles, and the optimum within
-// limits.
+// Relaxation in cycles that are split, ended early or limited. It must reach the same equilibrium as whole
+// cycles, and the optimum within limits.
 #include <gtest/gtest.h>
 #include <algorithm>
 #include <cmath>
@@ -33,7 +33,7 @@ using voxel::LinkMaterial;
 using voxel::Relaxation;
 using voxel::VoxelId;
 
-// The print of a ball on top of a block, under asynchronous relaxation (`apart`) or not.
+// The imprint of a ball on top of a block. `apart`: the relaxation is left to a shadow.
 struct Print {
   Print(const Lattice& lattice, bool apart) : state(lattice), relaxation(lattice) {
     if (apart) relaxation.leave_to_shadow();
@@ -78,7 +78,7 @@ TEST(Relaxation, ACycleInPartsEndsWhereAWholeOneDoes) {
   }
 }
 
-// A cycle that ends half way leaves the rest to the next one.
+// A cycle that ends early leaves its remaining part to the next cycle.
 TEST(Relaxation, CyclesThatEndHalfWayComeToTheSameRest) {
   const LatticeOptions options = tests::made_of(elastic(1e4, 0.3));
   const Lattice lattice(block({29, 27, 24}, glm::dvec3(1e-3)), options);
@@ -99,7 +99,7 @@ TEST(Relaxation, CyclesThatEndHalfWayComeToTheSameRest) {
 struct Tight {
   const char* name;
   LinkMaterial material;
-  double depth;  // in spacings
+  double depth;  // of the pressed patch, in spacings
 };
 
 TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
@@ -134,7 +134,8 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
     }
     EXPECT_TRUE(relaxation.asleep()) << row.name;
 
-    // First-order conditions by voxel: a residual remains only against a link at its limit.
+    // First-order conditions for each voxel: a residual may remain only in a direction that a link at its
+    // limit blocks.
     double unopposed = 0.0;
     std::size_t at_limit = 0;
     for (std::size_t i = 0; i < lattice.size(); ++i) {
@@ -152,7 +153,7 @@ TEST(Relaxation, WhereLimitsHoldTheStateIsTheOptimumOfTheProgram) {
         }
       }
     }
-    // The energy against that of the optimum.
+    // Compares the energy with that of the optimum.
     Problem p = problem_of(lattice, options, state, 2);
     const double found = tests::energy_of(p);
     tests::solve_with_limits(p, 1e-3);

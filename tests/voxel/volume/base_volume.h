@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A small volume with known places, and files of it in every format: 12 x 10 x 8 voxels of 2 mm with three
-// blocks of labels.
+// A small volume whose labels lie in known places, and files of it in every format. It has 12 x 10 x 8 voxels
+// of 2 mm, with three blocks of labels.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ inline int base_label(int i, int j, int k) {
   return 0;
 }
 
-// All labels, x fastest, as numbers of type T, times `scale`.
+// All labels times `scale`, as the bytes of numbers of type T, x fastest.
 template <typename T>
 std::string base_voxels(T scale = 1) {
   std::string out;
@@ -49,7 +49,7 @@ inline std::map<int, std::size_t> counts_of(const voxel::LabelVolume& volume) {
   return counts;
 }
 
-// Mean place of the voxels with a label, in the scene.
+// Mean place of the voxels with a label, in the scene's frame (m).
 inline glm::dvec3 centre_of(const voxel::LabelVolume& volume, int label) {
   glm::dvec3 sum(0.0);
   double count = 0.0;
@@ -65,7 +65,7 @@ inline glm::dvec3 centre_of(const voxel::LabelVolume& volume, int label) {
   return sum / count;
 }
 
-// A NIfTI-1 header in front of voxels; lengths are in the file's unit.
+// A NIfTI-1 file: a header followed by voxels. Lengths are in the file's unit.
 struct NiftiFile {
   std::int16_t type = 2, bits = 8;
   float voxel = 2.0F;
@@ -96,13 +96,14 @@ struct NiftiFile {
   }
 };
 
-// An NRRD header of these lines, in front of the base volume's labels.
+// An NRRD file: a header with these lines, followed by the base volume's labels.
 inline std::string nrrd_file(const std::string& lines) {
   return "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 12 10 8\nencoding: raw\n" + lines + "\n" +
          base_voxels<std::uint8_t>();
 }
 
-// A MetaImage header with these lines, in front of the base volume's labels. Its axes run as in kCentreOfTwo.
+// A MetaImage file: a header with these lines, followed by the base volume's labels. Its axes run as
+// described at kCentreOfTwo.
 inline std::string meta_file(const std::string& lines, const std::string& offset = "10 20 30") {
   return "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
          "TransformMatrix = -1 0 0 0 -1 0 0 0 1\nOffset = " +

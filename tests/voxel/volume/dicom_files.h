@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DICOM files of the base volume (base_volume.h), made by hand: in both byte orders, with and without types,
-// as one file a slice or as one file of all frames. Labels are stored a hundredfold.
+// DICOM files of the base volume (base_volume.h), made by hand. They exist in both byte orders, with and
+// without types, as one file per slice or as one file of all frames. Labels are stored times 100.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace tests {
 
-// How numbers and elements are written.
+// The encoding of numbers and elements.
 struct DicomText {
   bool big_endian = false, implicit = false;
 
@@ -44,7 +44,7 @@ struct DicomText {
   [[nodiscard]] std::string us(unsigned group, unsigned at, unsigned value) const {
     return element(group, at, "US", number(value, 2));
   }
-  // A sequence whose end a length states, or a delimiter.
+  // A sequence that ends by its length, or by a delimiter if `undefined`.
   [[nodiscard]] std::string sequence(unsigned group, unsigned at, const std::vector<std::string>& items,
                                      bool undefined = false) const {
     constexpr std::uint64_t kUndefined = 0xffffffffU;
@@ -63,8 +63,8 @@ struct DicomPixels {
   std::string type = "OW";
 };
 
-// The stored numbers of slice k, times `scale`. Words of `type` OW are turned as a whole by a writer of the
-// other byte order; 8-bit pixels among them lie in pairs.
+// The stored numbers of slice k: labels times `scale`. In big-endian files of `type` OW, whole 16-bit words
+// are swapped, so 8-bit pixels are swapped in pairs.
 inline std::string dicom_pixels(const DicomText& text, const DicomPixels& pixels, int k,
                                 double scale = 100.0) {
   std::string out;
@@ -78,7 +78,7 @@ inline std::string dicom_pixels(const DicomText& text, const DicomPixels& pixels
   return out;
 }
 
-// What is alike in all files. `more` goes before the pixels.
+// The elements that all files have. `more` is inserted before the pixels.
 inline std::string dicom_image(const DicomText& text, const std::string& place, const DicomPixels& pixels,
                                int frames, const std::string& more, const std::string& numbers) {
   const auto bits = static_cast<unsigned>(pixels.bits);
@@ -92,7 +92,7 @@ inline std::string dicom_image(const DicomText& text, const std::string& place, 
          text.us(0x28, 0x103, 0) + more + text.element(0x7fe0, 0x10, pixels.type, numbers);
 }
 
-// Slice k of a classic series. `with_place`: it states position and orientation.
+// Slice k of a classic series. `with_place`: the slice states its position and orientation.
 inline std::string dicom_slice(const DicomText& text, int k, const DicomPixels& pixels = {},
                                const std::string& more = "", bool with_place = true,
                                const std::string& thickness = "") {
@@ -106,13 +106,14 @@ inline std::string dicom_slice(const DicomText& text, int k, const DicomPixels& 
 
 // One frame of an enhanced file.
 struct EnhancedFrame {
-  int k = 0;  // the slice whose labels it shows
+  int k = 0;  // the slice whose labels the frame shows
   double z = 30.0;
-  std::optional<double> slope;  // its own, not the one of all
+  std::optional<double> slope;  // the frame's own slope; empty: the shared one
   std::vector<double> orientation{};
 };
 
-// An enhanced file; all frames share what they do not state. `shared_slope` 0: none is stated.
+// An enhanced file. Frames share the values that they do not state. `shared_slope` 0: no shared slope is
+// stated.
 inline std::string dicom_enhanced(const std::vector<EnhancedFrame>& frames, double shared_slope = 0.0,
                                   const std::string& series = "1.2.3") {
   const DicomText text;
@@ -142,7 +143,7 @@ inline std::string dicom_enhanced(const std::vector<EnhancedFrame>& frames, doub
   return image.insert(before, ids);
 }
 
-// The elements of group 2, which say how the others are written.
+// The elements of group 2, which state the encoding of the others.
 inline std::string dicom_meta(const DicomText& text) {
   const DicomText plain;
   const std::string rest = plain.element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DICOM slices made by hand, explicit little-endian, uncompressed or by run lengths: just what a reader of
-// volumes looks at.
+// DICOM slices made by hand: explicit little-endian, uncompressed or run-length encoded. They have only the
+// elements that a reader of volumes uses.
 #pragma once
 
 #include <array>
@@ -14,13 +14,13 @@ inline const std::string kRunLengths = "1.2.840.10008.1.2.5";
 
 struct DicomSlice {
   int columns = 4, rows = 3;
-  std::array<double, 2> spacing{1.0, 1.0};  // below 0: not said
+  std::array<double, 2> spacing{1.0, 1.0};  // (mm) below 0: not stated
   std::array<double, 3> position{0.0, 0.0, 0.0};
   std::array<double, 6> orientation{1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
   std::string series = "1.2.3";
   std::string syntax = "1.2.840.10008.1.2.1";
   int samples = 1;         // 3: RGB
-  std::int16_t value = 7;  // of all voxels
+  std::int16_t value = 7;  // value of all voxels
 };
 
 inline std::string dicom_number(std::uint64_t n, int bytes) {
@@ -29,8 +29,8 @@ inline std::string dicom_number(std::uint64_t n, int bytes) {
   return out;
 }
 
-// 16-bit pixels of one value as RLE Lossless has them (DICOM PS3.5, annex G): high bytes, then low bytes,
-// each as runs, in a fragment behind an empty table of offsets.
+// 16-bit pixels of one value in RLE Lossless (DICOM PS3.5, annex G). High bytes come first, then low bytes,
+// each as runs. They are in one fragment after an empty table of offsets.
 inline std::string dicom_runs(int count, std::int16_t value) {
   std::string high, low;
   for (int left = count; left > 0; left -= 100) {

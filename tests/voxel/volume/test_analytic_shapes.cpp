@@ -29,7 +29,7 @@ glm::dvec3 centre_of(const LabelVolume& volume, int i, int j, int k) {
   return volume.origin_m + glm::dvec3(i, j, k) * volume.spacing_m;
 }
 
-// The message of the refusal, or an empty string.
+// The message of the refusal; empty if the formula is accepted.
 std::string refusal(const Formula& formula, std::size_t max_voxels = kMillions) {
   try {
     make_volume(formula, max_voxels);
@@ -59,7 +59,7 @@ TEST(Formula, BlockHasRoundedCountsAndItsMiddleAtTheOrigin) {
 
 TEST(Formula, BallHasItsVolumeAndHoldsExactlyTheCentresInside) {
   for (const double diameter : {0.021, 0.04, 0.0405}) {
-    Formula formula = block(diameter, 0.0, 0.0, 1e-3);  // only x counts
+    Formula formula = block(diameter, 0.0, 0.0, 1e-3);  // only x is used
     formula.shape = Formula::Shape::ball;
     formula.spacing_m = {1e-3, 0.8e-3, 1.3e-3};
     const LabelVolume volume = make_volume(formula, kMillions);
@@ -76,7 +76,7 @@ TEST(Formula, BallHasItsVolumeAndHoldsExactlyTheCentresInside) {
         }
       }
     }
-    // The lattice misses no centre: one more voxel at either end would lie outside.
+    // The lattice misses no voxel: one more at either end would have its centre outside the shape.
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_LT(volume.origin_m[axis] - volume.spacing_m[axis], -0.5 * diameter + 1e-12);
     }
@@ -89,7 +89,7 @@ TEST(Formula, LayersStackFromTheBottom) {
   formula.layers = {{0.004, 2}, {0.0035, 3}, {0.0025, 0}};  // boundaries at 4, 7.5 and 10 spacings
   const LabelVolume volume = make_volume(formula, kMillions);
   for (int k = 0; k < 20; ++k) {
-    // The centre of slice 7 lies exactly on a boundary and goes to the layer above it.
+    // The centre of slice 7 lies exactly on a boundary. It belongs to the layer above.
     const int expected = k < 4 ? 2 : k < 7 ? 3 : k < 10 ? 0 : 9;
     for (int j = 0; j < 10; ++j) {
       for (int i = 0; i < 10; ++i) ASSERT_EQ(volume.labels[volume.index(i, j, k)], expected) << k;
@@ -129,7 +129,8 @@ TEST(Formula, LaterInclusionsWinAndStayInsideTheShape) {
   EXPECT_EQ(counts(volume), expected);
   EXPECT_EQ(expected[0], 8U);
 
-  formula.shape = Formula::Shape::ball;  // a box larger than the ball fills it and nothing else
+  formula.shape =
+      Formula::Shape::ball;  // a box that is larger than the ball fills the whole ball and nothing else
   const std::size_t filled = kMillions;
   formula.inclusions = {};
   const std::size_t ball_voxels = counts(make_volume(formula, filled))[1];

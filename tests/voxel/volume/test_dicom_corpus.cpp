@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DICOM series with one thing wrong each, made by hand.
+// DICOM series made by hand, each with one defect.
 #include <gtest/gtest.h>
 #include <zlib.h>
 #include <algorithm>
@@ -26,7 +26,7 @@ using voxel::LabelVolume;
 
 class DicomCorpus : public tests::VolumeFolder {
  protected:
-  // A folder with these slices; the name of each says its number.
+  // A folder with these slices, each named by its number.
   fs::path folder(const std::string& name, const std::vector<DicomSlice>& slices) const {
     fs::create_directories(in_folder(name));
     for (std::size_t n = 0; n < slices.size(); ++n)
@@ -45,7 +45,7 @@ class DicomCorpus : public tests::VolumeFolder {
 
 TEST_F(DicomCorpus, AStackIsReadInTheOrderOfItsPlaces) {
   std::vector<DicomSlice> slices = stack(5);
-  std::swap(slices[0], slices[3]);  // names say nothing
+  std::swap(slices[0], slices[3]);  // names do not give the order
   const LabelVolume v = voxel::load_volume(folder("a", slices), {});
   EXPECT_EQ(v.dims, (std::array{4, 3, 5}));
   EXPECT_NEAR(v.spacing_m.z, 2e-3, 1e-12);
@@ -55,8 +55,9 @@ TEST_F(DicomCorpus, AStackIsReadInTheOrderOfItsPlaces) {
 TEST_F(DicomCorpus, RunLengthsAreUnpacked) {
   std::vector<DicomSlice> slices = stack(4);
   for (DicomSlice& slice : slices) slice.syntax = tests::kRunLengths;
-  slices[2].columns = slices[1].columns = slices[0].columns = slices[3].columns = 37;  // more than one run
-  slices[2].value = 0x123;                                                             // both bytes
+  slices[2].columns = slices[1].columns = slices[0].columns = slices[3].columns =
+      37;                   // long enough for several runs
+  slices[2].value = 0x123;  // uses both bytes
   voxel::VolumeFileOptions options;
   options.rules = {{0x123, 0x123, 9}, {1, 4, 1}};
   const LabelVolume v = voxel::load_volume(folder("a", slices), options);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DICOM files in every way of writing them: frames, byte orders, icons, missing preambles and places.
+// DICOM files in all encodings: frames, byte orders, icons, missing preambles and missing places.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -23,7 +23,7 @@ using voxel::LabelVolume;
 
 class DicomFrames : public tests::VolumeFolder {
  protected:
-  // A folder with these files, named by their numbers.
+  // A folder with these files, each named by its number.
   fs::path folder(const std::vector<std::string>& files) {
     const std::string name = "series" + std::to_string(folders_++);
     fs::create_directories(in_folder(name));
@@ -41,7 +41,8 @@ class DicomFrames : public tests::VolumeFolder {
     for (const std::string& note : voxel::read_volume_header(path).notes) all += note + "\n";
     return all;
   }
-  // The folder holds the base volume, a hundredfold, 2 mm a voxel, from (-10, -20, 30) mm.
+  // Expects that the folder holds the base volume, with labels times 100 and 2 mm voxels, from (-10, -20, 30)
+  // mm on.
   static void expect_base(const fs::path& path, const std::string& what) {
     voxel::VolumeFileOptions options;
     options.rules = {{100, 100, 1}, {200, 200, 2}, {300, 300, 3}};
@@ -90,7 +91,7 @@ TEST_F(DicomFrames, FramesAreSortedByTheirPlaces) {
   std::swap(frames[1], frames[6]);
   std::swap(frames[0], frames[3]);
   expect_base(folder({with_preamble(dicom_enhanced(frames))}), "in no order");
-  // A series may be spread over several files of frames, and single frames.
+  // A series may consist of several files, with several frames or one.
   const std::vector<EnhancedFrame> one{frames[0]}, some(frames.begin() + 1, frames.begin() + 4),
       others(frames.begin() + 4, frames.end());
   expect_base(folder({with_preamble(dicom_enhanced(one)), with_preamble(dicom_enhanced(others)),
@@ -117,14 +118,15 @@ TEST_F(DicomFrames, FramesThatAreNotOneVolumeAreRefused) {
   EXPECT_SAYS(refusal_of(folder({with_preamble(dicom_enhanced(all_frames())),
                                  with_preamble(dicom_enhanced(all_frames(), 0.0, "1.2.4"))})),
               "2 DICOM series");
-  // A count that is not that of the frames.
+  // The stated count differs from the number of frames.
   std::string bytes = with_preamble(dicom_enhanced(all_frames()));
   const std::string eight = DicomText{}.element(0x28, 8, "IS", "8");
   bytes.replace(bytes.find(eight), eight.size(), DicomText{}.element(0x28, 8, "IS", "7"));
   EXPECT_NE(refusal_of(folder({bytes})), "");
 }
 
-// Frames without groups: a dose states offsets, others state a step, and a film of moments states neither.
+// Frames without functional groups. A dose states offsets, other classes state a step between frames, and a
+// film over time states neither.
 TEST_F(DicomFrames, FramesOfOnePlaceLieByTheirStep) {
   const DicomText text;
   const auto file = [&](const std::string& more, const std::string& of_class) {
@@ -171,7 +173,7 @@ TEST_F(DicomFrames, NumbersOfEveryByteOrderAreRead) {
                   "big " + std::to_string(bits) + type);
     }
   }
-  // Pixels of 8 bits: only whole words are turned.
+  // With pixels of 8 bits, only whole words are swapped.
   for (const DicomText& text : {DicomText{}, big}) {
     for (const char* type : {"OW", "OB"}) {
       const fs::path path = slices([&](int k) {
@@ -234,14 +236,15 @@ TEST_F(DicomFrames, IconsInSequencesAreNoPixelsOfTheSlice) {
           undefined ? "ended by delimiters" : "ended by lengths");
     }
   }
-  // A file whose only pixels are those of an icon is no slice: it is left out.
+  // A file that has no pixels except an icon's is not a slice, and is left out.
   const fs::path mixed = slices([&](int k) { return with_preamble(dicom_slice(text, k)); });
   std::string report = dicom_slice(text, 0, {}, icon(plain, false));
   report.resize(report.size() - 240 - 12);
   std::ofstream(mixed / "report", std::ios::binary) << with_preamble(report);
   expect_base(mixed, "a report among the slices");
   EXPECT_SAYS(notes_of(mixed), "1 files");
-  // Undefined inside undefined, of an icon of an icon: damage, told or not, ends in a refusal or a volume.
+  // An icon in an icon, both of undefined length. The file may be read or refused, but must not crash the
+  // reader.
   refusal_of(folder({with_preamble(dicom_slice(text, 0, {}, icon(icon(fragments, true), true)))}));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Thinning against what it promises, by brute force: what hung together still does, no surface changes, and
-// no tool gets behind it.
+// Brute-force checks of the guarantees of thinning: connected pieces stay connected, no surface changes, and
+// no tool gets behind a surface.
 #include "voxel/volume/interior_coarsening.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ ThinningOptions thick(std::vector<std::uint8_t> labels, int every, int shell) {
   return {.labels = std::move(labels), .every = every, .shell = shell, .tool_radius_m = 1e-3};
 }
 
-// Number of the piece of each voxel for which `chosen`, by flood fill; -1 for the others.
+// [voxel] number of its connected piece of chosen voxels, by flood fill; -1 for voxels that are not chosen.
 std::vector<int> pieces(const LabelVolume& v, const std::function<bool(std::uint8_t)>& chosen) {
   std::vector<int> piece(v.labels.size(), -1);
   int count = 0;
@@ -100,7 +100,7 @@ void expect_promises(const LabelVolume& before, const ThinningOptions& options) 
   }
   EXPECT_EQ(thinned.stiff, stiff);
   EXPECT_EQ(thinned.removed, removed);
-  // Two voxels that are left hang together if and only if they did before.
+  // Two remaining voxels are connected if and only if they were connected before.
   const std::vector<int> whole = pieces(before, filled), left = pieces(after, filled);
   std::vector<int> whole_of(before.labels.size(), -1), left_of(before.labels.size(), -1);
   for (std::size_t n = 0; n < left.size(); ++n) {
@@ -117,7 +117,7 @@ TEST(Thinning, WhatHangsTogetherStillDoes) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   for (int scene = 0; scene < 40; ++scene) {
-    // Balls of bone in tissue or in nothing, with holes of all sizes in them.
+    // Balls of bone in tissue or in empty space. The balls have holes of many sizes.
     std::vector<glm::dvec4> balls, holes;
     for (int n = 0; n < 4; ++n)
       balls.emplace_back(30 * unit(random), 25 * unit(random), 28 * unit(random), 5 + 8 * unit(random));
@@ -141,7 +141,7 @@ TEST(Thinning, WhatHangsTogetherStillDoes) {
 }
 
 TEST(Thinning, TheWallOfASmallCavityIsHeld) {
-  // No strut of a coarse frame passes where this cavity is.
+  // This cavity lies where no strut of a coarse frame passes.
   const LabelVolume v = volume_of({41, 41, 41}, [](int i, int j, int k) {
     return glm::length(glm::dvec3(i, j, k) - glm::dvec3(8.0)) < 1.2 ? 0 : kBone;
   });
@@ -154,8 +154,8 @@ TEST(Thinning, LeavesTheShareThatTheFrameHas) {
   const LabelVolume v = volume_of({64, 64, 64}, [](int, int, int) { return kBone; });
   for (const int n : {2, 3, 4, 8}) {
     const voxel::Thinned thinned = voxel::thin_labels(v, thick({kBone}, n, 1));
-    // Rows along three axes where both other coordinates are multiples of n, and in the outermost layers of
-    // the inside also where one is.
+    // The frame has rows along each axis where both other coordinates are multiples of n. In the outermost
+    // layers of the inside, one such coordinate is enough.
     std::size_t frame = 0;
     for (int k = 1; k < 63; ++k) {
       for (int j = 1; j < 63; ++j) {
@@ -174,8 +174,8 @@ TEST(Thinning, LeavesTheShareThatTheFrameHas) {
   }
 }
 
-// Where the centre of a ball tool can get to from outside, sampled at half a spacing; and whether that is in
-// a place where a voxel was removed.
+// Whether the centre of a ball tool can get from outside into the place of a removed voxel. Places are
+// sampled at half a spacing. `tool` is the ball's radius in spacings.
 bool gets_behind(const LabelVolume& before, const LabelVolume& after, double tool) {
   const int margin = 4;
   LabelVolume space;  // 1: free for the tool's centre
@@ -221,7 +221,8 @@ TEST(Thinning, NoToolGetsBehindTheSurface) {
     return r < 9.0 && glm::length(glm::dvec3(i, j, k) - glm::dvec3(17.0, 9.5, 9.5)) > 4.0 ? kBone : 0;
   };
   const LabelVolume v = volume_of({20, 20, 20}, bone);
-  // The smallest tool that is allowed, at rest: half a diagonal less half a voxel.
+  // Radius of the smallest tool that is allowed at rest: half the diagonal of a face less half a voxel (in
+  // spacings).
   const double tool = 0.5 * std::sqrt(2.0) - 0.5 + 1e-6;
   for (const int every : {2, 4, 7}) {
     ThinningOptions options = thick({kBone}, every, 1);
@@ -230,7 +231,7 @@ TEST(Thinning, NoToolGetsBehindTheSurface) {
     options.tool_radius_m = tool * 1e-3 - 2e-9;
     EXPECT_THROW(voxel::thin_labels(v, options), std::invalid_argument);
   }
-  // The test would notice: with a hole in the shell the tool is behind it.
+  // Counter-check of gets_behind(): through a hole in the shell, the tool gets behind it.
   LabelVolume open = voxel::thin_labels(v, thick({kBone}, 7, 1)).volume;
   for (int k = 0; k < 20; ++k) {
     for (int j = 8; j < 12; ++j) {
@@ -257,7 +258,7 @@ TEST(Thinning, WhatCannotBeIsRefusedInWords) {
   ThinningOptions needle = thick({kBone}, 3, 1);
   needle.tool_radius_m = 0.5e-3;
   EXPECT_EQ(said(v, needle), "");
-  needle.stretch_max = 1.6;  // the same needle, where the shell can be stretched
+  needle.stretch_max = 1.6;  // the same needle with a shell that can be stretched
   EXPECT_NE(said(v, needle).find("fits between"), std::string::npos);
   const LabelVolume full = volume_of({16, 16, 2}, [](int i, int j, int) { return i + 16 * j; });
   EXPECT_NE(said(full, thick({kBone}, 3, 1)).find("labels"), std::string::npos);

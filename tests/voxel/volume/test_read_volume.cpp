@@ -93,7 +93,7 @@ TEST_F(VolumeFile, RoundTripOfThinVolumesAndOtherUnits) {
 TEST_F(VolumeFile, QuarterTurnsAreExact) {
   for (const char* name : kNames) {
     LabelVolume volume = random_volume({2, 3, 4}, 1);
-    volume.rotation = {0.5, 0.5, 0.5, 0.5};  // x to y to z
+    volume.rotation = {0.5, 0.5, 0.5, 0.5};  // maps x to y, y to z, z to x
     voxel::save_volume(in_folder(name), volume);
     const glm::dquat q = voxel::load_volume(in_folder(name), {}).rotation;
     EXPECT_EQ(std::abs(q.w), 0.5) << name;
@@ -120,7 +120,7 @@ TEST_F(VolumeFile, SavingIsRefusedInWords) {
   EXPECT_EQ(save(in_folder("v.nrrd")), "");
 }
 
-// ---- Left-handed frames, rules, resampling: against the definition, with MetaImage files written by hand
+// ---- Left-handed frames, rules and resampling, with MetaImage files made by hand, against their definition
 
 std::string meta(const std::string& dims, const std::string& spacing, const std::string& matrix,
                  const std::string& type, const std::string& data, const std::string& more = "") {
@@ -151,7 +151,7 @@ TEST_F(VolumeFile, LeftHandedFramesKeepEachVoxelInItsPlace) {
         for (int i = 0; i < 2; ++i) places[volume.labels[volume.index(i, j, k)]] = place_of(volume, i, j, k);
       }
     }
-    for (int n = 0; n < 24; ++n) {  // MetaImage: three numbers of the matrix an axis
+    for (int n = 0; n < 24; ++n) {  // in MetaImage, each axis is three numbers of the matrix
       const std::array<int, 3> index{n % 2, n / 2 % 3, n / 6};
       const glm::dvec3 at(index[0] * 1.0, index[1] * 2.0, index[2] * 3.0);
       glm::dvec3 expected(10.0, 20.0, 30.0);
@@ -312,7 +312,7 @@ TEST_F(VolumeFile, RefusesBadOptionsAndTooMuchMemory) {
   const fs::path path = in_folder("v.nii.gz");
   voxel::save_volume(path, random_volume({50, 40, 30}, 0));
   VolumeFileOptions options;
-  options.max_bytes = 50'000;  // for 60,000 voxels
+  options.max_bytes = 50'000;  // too few for 60,000 voxels
   EXPECT_SAYS(refusal_of(path, options), "50 x 40 x 30");
   EXPECT_SAYS(refusal([&] { voxel::read_volume_statistics(path, 1000); }), "MB");
   options = {};
@@ -375,7 +375,7 @@ TEST_F(VolumeFile, NiftiHeadersThatAreNotOneVolume) {
   EXPECT_EQ(statistics.maximum, 4.0);
 }
 
-// ---- Mutations: whatever the bytes, a volume within the limit or a VolumeError
+// ---- Mutations: all bytes must end in a volume within the limit or in a VolumeError
 
 TEST_F(VolumeFile, MutatedFilesEndInAVolumeOrARefusal) {
   std::mt19937 random(20);
@@ -386,9 +386,9 @@ TEST_F(VolumeFile, MutatedFilesEndInAVolumeOrARefusal) {
   const auto start = std::chrono::steady_clock::now();
   std::size_t loaded = 0;
   std::size_t refused = 0;
-  // An instrumented or busy machine does fewer, not longer.
+  // On a slow machine the test does fewer mutations instead of taking longer.
   const auto late = [&] { return std::chrono::steady_clock::now() - start > std::chrono::seconds(15); };
-  ::testing::internal::CaptureStdout();  // the libraries talk while they fail
+  ::testing::internal::CaptureStdout();  // the libraries print messages when they fail
   ::testing::internal::CaptureStderr();
   for (const char* name : kNames) {
     const fs::path path = in_folder(name);
@@ -396,7 +396,7 @@ TEST_F(VolumeFile, MutatedFilesEndInAVolumeOrARefusal) {
     const std::string original = contents(path);
     for (int n = 0; n < 800 && !late(); ++n) {
       std::string bytes = original;
-      // The header, which is where the trouble is, more often than the voxels.
+      // Mutates the header more often than the voxels, because most defects are possible there.
       const std::size_t reach = n % 4 == 0 ? bytes.size() : std::min<std::size_t>(bytes.size(), 360);
       const auto changes = 1 + random() % 3;
       for (unsigned change = 0; change < changes; ++change) {
@@ -420,7 +420,7 @@ TEST_F(VolumeFile, MutatedFilesEndInAVolumeOrARefusal) {
         }
         if (bytes.size() < reach) break;
       }
-      fs::remove(path);  // a new file is not forced to the disk, as a rewritten one may be
+      fs::remove(path);  // unlike a rewritten file, a new file is not flushed to the disk
       std::ofstream(path, std::ios::binary) << bytes;
       try {
         const LabelVolume result = voxel::load_volume(path, options);

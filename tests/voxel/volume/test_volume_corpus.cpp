@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volumes with one thing wrong each, made by hand: each is read right, or refused with the words that say
-// what it is. And the same files with random bytes changed or cut off: a volume or a refusal, nothing else.
+// Volumes made by hand, each with one defect or peculiarity. Each is read correctly, or refused with a
+// message that names the defect. The same files with random bytes changed or cut off must end in a volume or
+// a refusal.
 #include <gtest/gtest.h>
 
 #include <zlib.h>
@@ -33,7 +34,7 @@ class VolumeCorpus : public tests::VolumeFolder {};
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-// A NIfTI of 4 x 3 x 2 voxels that hold 0, 1, 2, …; what the cases change is public.
+// A NIfTI file of 4 x 3 x 2 voxels with the values 0, 1, 2, … The cases change its public members.
 struct Nifti {
   std::vector<std::int16_t> dims{4, 3, 2};
   std::int16_t type = 2, bits = 8;
@@ -131,7 +132,7 @@ std::string nrrd(const std::map<std::string, std::string>& changed, const std::s
                                            {"encoding", "raw"}};
   for (const auto& [key, value] : changed) lines[key] = value;
   std::string out = "NRRD0004\n";
-  // The order matters to the format: how many axes there are comes before what they are.
+  // The format requires this order: the number of axes comes before their properties.
   for (const char* key : {"type", "dimension", "space", "sizes", "spacings", "space directions", "kinds",
                           "endian", "encoding", "space origin", "byte skip", "line skip"}) {
     const auto line = lines.find(key);
@@ -156,8 +157,8 @@ std::string swapped_bytes() {
 
 struct Case {
   std::string name, bytes;
-  std::string refusal;  // a part of its words; empty: it is read, as 0, 1, 2, …
-  std::string note{};   // and this is said of it
+  std::string refusal;  // part of the expected message; empty: the file is read, with the values 0, 1, 2, …
+  std::string note{};   // part of the note that is expected for the file
 };
 
 Nifti with(const std::function<void(Nifti&)>& change) {
@@ -222,7 +223,7 @@ std::vector<Case> corpus() {
         n.sform = {1, 0, 0, 30, 0, 1, 0, 0, 0, 0, 1, 0};
       },
       "different places");
-  // What a voxel is.
+  // Types of voxels.
   nifti("one channel", [](Nifti& n) { n.type = 128, n.bits = 24; });
   nifti("", [](Nifti& n) { n.type = 16, n.bits = 32; });
   nifti("", [](Nifti& n) { n.type = 64, n.bits = 64; });
@@ -255,7 +256,7 @@ std::vector<Case> corpus() {
   all.push_back({"v.nrrd", nrrd({{"endian", "big"}, {"type", "int32"}}, swapped_bytes<std::int32_t>()), ""});
   all.push_back({"v.nrrd", nrrd({{"endian", none}, {"type", "int16"}}, swapped_bytes<std::int16_t>()),
                  "header cannot be read"});
-  // Where the voxels are, and how they are packed.
+  // The offset and the packing of the voxels.
   nifti("byte", [](Nifti& n) { n.offset = -5.0F; });
   nifti("byte", [](Nifti& n) { n.offset = kNan; });
   nifti("byte", [](Nifti& n) { n.offset = 1e9F; });
@@ -282,7 +283,7 @@ std::vector<Case> corpus() {
   std::string sum = packed;
   sum[sum.size() - 6] = static_cast<char>(sum[sum.size() - 6] ^ 1);
   all.push_back({"v.nii.gz", sum, "v.nii.gz"});
-  // Other kinds of file.
+  // Other kinds of files.
   all.push_back({"v.nii", packed, ".nii.gz"});
   all.push_back({"v.nii.gz", Nifti{}.text(), "end in .nii"});
   nifti("NIfTI-2", [](Nifti& n) { n.header_bytes = 540; });
@@ -303,7 +304,7 @@ TEST_F(VolumeCorpus, EachIsReadRightOrRefusedInWords) {
       const LabelVolume v = voxel::load_volume(path, {}, &notes);
       EXPECT_EQ(c.refusal, "") << where << " was read";
       ASSERT_EQ(v.labels.size(), 24U) << where;
-      // NIfTI's frames come out turned, never mirrored: the order of voxels stays.
+      // NIfTI frames are rotated but never mirrored, so the order of the voxels stays.
       for (std::size_t n = 0; n < 24; ++n) EXPECT_EQ(v.labels[n], n) << where;
       std::string said;
       for (const std::string& note : notes) said += note + "\n";
@@ -320,7 +321,7 @@ TEST_F(VolumeCorpus, EachIsReadRightOrRefusedInWords) {
 
 // ---- random damage
 
-// DICOM files of other kinds: frames, the other byte order, no preamble, an icon.
+// Other kinds of DICOM files: with frames, in the other byte order, without a preamble, with an icon.
 std::vector<std::string> other_dicom() {
   const tests::DicomText text, big{.big_endian = true, .implicit = false},
       untyped{.big_endian = false, .implicit = true};
@@ -339,7 +340,7 @@ std::vector<std::string> other_nrrd_headers() {
       "spacings: 2 2 2\naxis mins: -1 -2 -3\ncenters: cell node ???\nunits: \"cm\" \"cm\" \"\"\n"};
 }
 
-// A second and a half, or HYBRID_FUZZ_SECONDS of it, from HYBRID_FUZZ_SEED.
+// Runs for 1.5 s, or for HYBRID_FUZZ_SECONDS if this is set. HYBRID_FUZZ_SEED sets the seed.
 TEST_F(VolumeCorpus, DamagedFilesEndInAVolumeOrARefusal) {
   const char* given = std::getenv("HYBRID_FUZZ_SECONDS");
   const char* seed = std::getenv("HYBRID_FUZZ_SEED");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volumes that others made: public data sets and DICOM series, against what their lists of sources say.
+// Public data sets and DICOM series, against the values in their lists of sources.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,8 +35,9 @@ TEST_F(VolumeDataSets, SharedVolumesAreAsDocumented) {
     const char* component;
     glm::dvec3 spacing_mm;
     std::array<double, 2> range;
-    std::size_t labels;  // distinct values, 0 where the file holds intensities
-    glm::dvec3 x, y;     // the first two axes of the result in LPS: RAS (-1, -1, 1), LPS (1, 1, 1)
+    std::size_t labels;  // number of distinct values; 0 if the file holds intensities
+    glm::dvec3 x,
+        y;  // first two axes of the result in LPS: -left and -back for RAS files, left and back for LPS
   };
   const glm::dvec3 left(1, 0, 0);
   const glm::dvec3 back(0, 1, 0);
@@ -87,7 +88,7 @@ TEST_F(VolumeDataSets, SharedVolumesAreAsDocumented) {
     std::size_t counted = 0;
     for (const auto& [label, count] : statistics.label_counts) counted += count;
     if (expected.labels > 0) {
-      EXPECT_EQ(counted, header.bytes) << expected.name;  // one byte a voxel
+      EXPECT_EQ(counted, header.bytes) << expected.name;  // one byte per voxel
     }
   }
 }
@@ -103,7 +104,7 @@ TEST_F(VolumeDataSets, DicomSeriesLiesWhereItsLabelsAre) {
   const voxel::VolumeStatistics statistics = voxel::read_volume_statistics(dicom);
   EXPECT_EQ(statistics.minimum, -1024.0);  // after rescaling
   EXPECT_GT(statistics.maximum, 1000.0);
-  // Bone in the CT against bone in the labels: the two frames put them in the same places.
+  // Bone in the CT and bone in the labels lie in the same places, because both frames are read correctly.
   VolumeFileOptions options;
   options.rules = {{250, 4000, 1}};
   const LabelVolume bone = voxel::load_volume(dicom, options);
@@ -128,7 +129,8 @@ TEST_F(VolumeDataSets, DicomSeriesLiesWhereItsLabelsAre) {
     }
   }
   ASSERT_GT(both, 1000U);
-  // Spongy bone is below the threshold; anywhere but in its place, hardly any voxel would be above it.
+  // Spongy bone is below the threshold, so the overlap is partial. With a wrong frame, hardly any voxel of
+  // the labels would be above the threshold.
   EXPECT_GT(static_cast<double>(same), 0.25 * static_cast<double>(both)) << same << " of " << both;
 }
 
@@ -151,7 +153,7 @@ TEST_F(VolumeDataSets, DicomFoldersThatAreNotOneWholeSeriesAreRefused) {
   EXPECT_EQ(voxel::read_volume_header(copy("single", {3})).dims, (std::array{512, 512, 1}));
   EXPECT_EQ(voxel::read_volume_header(copy("some", {2, 3, 4})).dims[2], 3);
 
-  // Another series: these slices have an empty identifier, the third gets one.
+  // These slices have an empty series identifier. The third slice gets one, so it is another series.
   const fs::path two = copy("two", {0, 1});
   std::string bytes = contents(slices[2]);
   const std::string empty{"\x20\x00\x0e\x00UI\x00\x00", 8};
@@ -165,13 +167,13 @@ TEST_F(VolumeDataSets, DicomFoldersThatAreNotOneWholeSeriesAreRefused) {
   std::ofstream(two / "other", std::ios::binary) << bytes;
   EXPECT_SAYS(refusal([&] { voxel::read_volume_header(two); }), "2 DICOM series");
 
-  // What is not DICOM is left out, with a note.
+  // A file that is not DICOM is left out, with a note.
   const fs::path mixed = copy("mixed", {5, 6});
   std::ofstream(mixed / "README") << "two slices";
   ASSERT_EQ(voxel::read_volume_header(mixed).notes.size(), 1U);
   EXPECT_SAYS(voxel::read_volume_header(mixed).notes[0], "1 files");
 
-  // Damage: some bytes changed or cut off.
+  // Damaged files, with some bytes changed or cut off.
   std::mt19937 random(4);
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Frames, units and scaling as headers state them: against a volume whose labels lie in known places.
+// Frames, units and scaling as stated by headers, against a volume whose labels lie in known places.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -28,13 +28,13 @@ using voxel::LabelVolume;
 
 class VolumeHeaders : public tests::VolumeFolder {
  protected:
-  // Notes of the file, one a line.
+  // The notes on the file, one per line.
   static std::string notes_of(const fs::path& path) {
     std::string all;
     for (const std::string& note : voxel::read_volume_header(path).notes) all += note + "\n";
     return all;
   }
-  // The file has the labels of the base volume, in 2 mm, in their places.
+  // Expects that the file has the labels of the base volume, in their places and with 2 mm voxels.
   static void expect_base(const fs::path& path, const std::string& what, double tolerance_m = 1e-9) {
     const LabelVolume volume = voxel::load_volume(path, {});
     EXPECT_EQ(counts_of(volume), kBaseCounts) << what;
@@ -109,7 +109,7 @@ TEST_F(VolumeHeaders, SpacesOfNrrdWithTimeAreTheSame) {
     const glm::dvec3 origin = glm::dvec3(-10.0, -20.0, 30.0) * c.from_ras;
     expect_base(write("v.nrrd", nrrd_file(vectors(step, origin, c.name, "", true))), c.name);
   }
-  // A fourth axis along time, with one entry; with two it is no single volume.
+  // A fourth axis along time. One entry is accepted; two entries are not a single volume.
   const auto with_axis = [](int times) {
     const std::string data = tests::base_voxels<std::uint8_t>();
     return "NRRD0005\ntype: uint8\ndimension: 4\nsizes: 12 10 8 " + std::to_string(times) +
@@ -133,7 +133,7 @@ TEST_F(VolumeHeaders, SpacesWithoutAnatomyAreSaid) {
     EXPECT_FALSE(voxel::read_volume_header(path).directions_known) << space;
     const LabelVolume volume = voxel::load_volume(path, {});
     EXPECT_EQ(counts_of(volume), kBaseCounts) << space;
-    // A left-handed space is mirrored, so that what is a left hand stays one.
+    // The volume of a left-handed space is mirrored, so that a left hand stays a left hand.
     EXPECT_NEAR(centre_of(volume, 2).x, left ? -7e-3 : 7e-3, 1e-9) << space;
     EXPECT_NEAR(centre_of(volume, 2).y, -11e-3, 1e-9) << space;
   }
@@ -147,7 +147,7 @@ TEST_F(VolumeHeaders, AxesOfNrrdWithoutDirectionsAreSaid) {
   const fs::path path = write("v.nrrd", nrrd_file("spacings: 2 2 2\naxis mins: -11 -21 29\n"));
   EXPECT_SAYS(notes_of(path), "anatomical directions are unknown");
   const LabelVolume volume = voxel::load_volume(path, {});
-  // The minimum of an axis is the border of its first voxel.
+  // The `axis mins` of NRRD is the border of the first voxel, not its centre.
   EXPECT_LT(glm::distance(volume.origin_m, glm::dvec3(-10e-3, -20e-3, 30e-3)), 1e-12);
   const fs::path nodes =
       write("v.nrrd", nrrd_file("spacings: 2 2 2\naxis mins: -10 -20 30\ncenters: node node node\n"));
@@ -187,7 +187,7 @@ TEST_F(VolumeHeaders, UnitsOfNrrdScaleStepsAndPlace) {
     expect_base(
         write("v.nrrd", nrrd_file(vectors(step, origin, "RAS", "space units: " + word + word + word + "\n"))),
         unit.word, 1e-7);
-    // Units of the axes, where no space has one.
+    // Units are stated per axis, because no space states one.
     std::ostringstream axes;
     axes << "spacings: " << step.x << ' ' << step.y << ' ' << step.z << "\nunits: " << word << word << word
          << "\n";
@@ -282,7 +282,7 @@ TEST_F(VolumeHeaders, ASlopeOfZeroScalesNothing) {
     expect_base(write("v.nii", file.text(numbers)), "slope 0");
     EXPECT_EQ(voxel::read_volume_header(in_folder("v.nii")).component, "int16");
   }
-  // The neighbours: an intercept with a slope of 1, a real slope, and no finite one.
+  // Related cases: an intercept with a slope of 1, other slopes, and a slope that is not finite.
   file.slope = 1.0F;
   voxel::VolumeStatistics s = voxel::read_volume_statistics(write("v.nii", file.text(numbers)));
   EXPECT_EQ(s.minimum, 5.0);
@@ -299,7 +299,7 @@ TEST_F(VolumeHeaders, ASlopeOfZeroScalesNothing) {
   EXPECT_SAYS(refusal_of(write("v.nii", file.text(numbers))), "finite");
 }
 
-// ---- Files that stand in the place of a volume
+// ---- Other files in the place of a volume
 
 TEST_F(VolumeHeaders, ForeignFilesAreNamed) {
   const std::string pointer =
@@ -313,7 +313,7 @@ TEST_F(VolumeHeaders, ForeignFilesAreNamed) {
     EXPECT_SAYS(refusal_of(write(name, "\n<!DOCTYPE html><html></html>")), "web page");
   }
   EXPECT_SAYS(refusal_of(write("v.mha", "\x1F\x8B\x08")), "gzip");
-  // The voxels beside their header may be such a file, too.
+  // A separate file of voxels may be such a pointer too.
   (void)write("v.raw", pointer);
   const std::string frame = vectors(glm::dvec3(2.0), glm::dvec3(-10, -20, 30), "RAS");
   EXPECT_SAYS(refusal_of(write("v.nhdr", nrrd_file(frame + "data file: v.raw\n"))), "Git LFS pointer");
@@ -322,7 +322,7 @@ TEST_F(VolumeHeaders, ForeignFilesAreNamed) {
   EXPECT_SAYS(refusal_of(write("v.nrrd", packed)), "bzip2");
   packed.replace(packed.find("bzip2"), 5, "bz2");
   EXPECT_SAYS(refusal_of(write("v.nrrd", packed)), "bzip2");
-  // A folder of slices: a pointer among them, or in the place of all.
+  // A folder of slices in which one slice or all slices are pointers.
   fs::create_directories(in_folder("slices"));
   (void)write("slices/1.dcm", pointer);
   EXPECT_SAYS(refusal_of(in_folder("slices")), "Git LFS pointer");

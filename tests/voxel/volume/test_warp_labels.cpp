@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Labels moved by displacements with a known answer.
+// Labels that are moved by displacements with known results.
 #include "voxel/volume/warp_labels.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,7 @@ LabelVolume warp(const LabelVolume& v, const Field& field, std::size_t most = kM
       most);
 }
 
-// The label at a place of the scene; 0 outside.
+// The label at a place in the scene's frame; 0 outside the volume.
 int label_at(const LabelVolume& v, const glm::dvec3& place) {
   const glm::dvec3 c = glm::round(glm::conjugate(v.rotation) * (place - v.origin_m) / v.spacing_m);
   for (int a = 0; a < 3; ++a) {
@@ -93,23 +93,23 @@ TEST(WarpedLabels, StretchedAndShearedTissueHasNoHole) {
   LabelVolume v = random_labels({12, 12, 12}, 3);
   std::fill(v.labels.begin(), v.labels.end(), std::uint8_t{1});
   const std::array<glm::dmat3, 3> gradients{
-      glm::dmat3(0.6, 0, 0, 0, 0.6, 0, 0, 0, 0.6),                 // every link at its longest
-      glm::dmat3(0.5, 0.5, -0.4, 0.3, 0.2, 0.3, -0.3, 0.4, -0.3),  // and sheared
-      glm::dmat3(0, 1.4, 0, 0, 0, 1.2, 0, 0, 0)};                  // by more than its own thickness
+      glm::dmat3(0.6, 0, 0, 0, 0.6, 0, 0, 0, 0.6),                 // every link 1.6 times as long
+      glm::dmat3(0.5, 0.5, -0.4, 0.3, 0.2, 0.3, -0.3, 0.4, -0.3),  // stretch and shear
+      glm::dmat3(0, 1.4, 0, 0, 0, 1.2, 0, 0, 0)};                  // shear by more than the block's thickness
   for (const glm::dmat3& gradient : gradients) {
-    const glm::dmat3 map = glm::dmat3(1.0) + gradient;  // in indices
+    const glm::dmat3 map = glm::dmat3(1.0) + gradient;  // in units of voxels
     const LabelVolume w = warp(
         v, [&](int i, int j, int k) { return gradient * glm::dvec3(i, j, k) * v.spacing_m; }, 10 * kMost);
-    // The image of the block is a parallelepiped: exactly its centres are filled.
+    // The image of the block is a parallelepiped. Exactly the voxels with their centres inside it are filled.
     const glm::dmat3 back = glm::inverse(map);
-    const glm::dvec3 shift =
-        glm::conjugate(v.rotation) * (w.origin_m - v.origin_m) / v.spacing_m;  // of the enlarged lattice
+    const glm::dvec3 shift = glm::conjugate(v.rotation) * (w.origin_m - v.origin_m) /
+                             v.spacing_m;  // offset of the enlarged lattice, in voxels
     std::size_t inside = 0;
     for (int k = 0; k < w.dims[2]; ++k) {
       for (int j = 0; j < w.dims[1]; ++j) {
         for (int i = 0; i < w.dims[0]; ++i) {
           const glm::dvec3 rest = back * (glm::dvec3(i, j, k) + shift);
-          // The outermost half voxel goes as the voxel that it belongs to, not as the map: left out.
+          // The outermost half voxel moves with its voxel, not by the map. So it is not tested.
           bool core = true, far = false;
           for (int a = 0; a < 3; ++a) {
             core = core && rest[a] > 0.0 && rest[a] < 11.0;
@@ -132,7 +132,7 @@ TEST(WarpedLabels, StretchedAndShearedTissueHasNoHole) {
 }
 
 TEST(WarpedLabels, ADentTakesLabelsAlongAndEmptySpaceFollows) {
-  // Two layers; the upper one is pressed into the lower one by two and a half voxels in the middle.
+  // Two layers. In the middle, the upper layer is pressed into the lower one by up to two and a half voxels.
   LabelVolume v = random_labels({20, 20, 20}, 4);
   v.spacing_m = glm::dvec3(1e-3);
   for (int k = 0; k < 20; ++k) {
@@ -152,7 +152,8 @@ TEST(WarpedLabels, ADentTakesLabelsAlongAndEmptySpaceFollows) {
       const double top = 19.5 + dent(i, j, 19.5), border = 9.5 + dent(i, j, 9.5);
       for (int k = 0; k < 20; ++k) {
         const int expected = k < border ? 1 : k < top ? 2 : 0;
-        if (std::min(std::abs(k - border), std::abs(k - top)) < 0.1) continue;  // a tie
+        if (std::min(std::abs(k - border), std::abs(k - top)) < 0.1)
+          continue;  // too close to a border to decide
         wrong += w.labels[w.index(i, j, k)] != expected;
       }
     }

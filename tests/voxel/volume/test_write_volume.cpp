@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is written, read back by our own reader (labels) and by ITK (vectors).
+// Written volumes, read back by the project's own reader (labels) and by ITK (vectors).
 #include "voxel/volume/write_volume.h"
 
 #include <itkMetaImageIO.h>
@@ -81,7 +81,7 @@ TEST_F(VolumeWriter, ItkReadsADisplacementFieldWhereAndAsItIs) {
 }
 
 TEST_F(VolumeWriter, ALargeVolumeNeedsASliceOfMemory) {
-  // What is asked for is one slice at a time, in order, and nothing else is kept.
+  // The writer asks for one slice at a time, in order, and keeps no other slice.
   const VolumeFrame frame{{64, 64, 200}, glm::dvec3(1e-3)};
   const fs::path path = in_folder("v.nrrd");
   int asked = 0;
@@ -109,7 +109,7 @@ TEST_F(VolumeWriter, AWriterThatFailsLeavesWhatWasThere) {
 }
 
 TEST_F(VolumeWriter, AFullDiskIsSaidInWords) {
-  // A limit on the size of files stands for the disk.
+  // A limit on the size of files simulates a full disk.
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);
   const auto ignored = std::signal(SIGXFSZ, SIG_IGN);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tests of volume files share: a folder of their own, and refusals as text.
+// Common parts of the tests of volume files: a folder for each test, and refusals as text.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace tests {
 
 namespace fs = std::filesystem;
 
-// A folder of its own for each test, removed at its end.
+// A folder for the files of one test, removed at the test's end.
 class VolumeFolder : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -61,7 +61,7 @@ inline std::string refusal_of(const fs::path& path, const voxel::VolumeFileOptio
 
 #define EXPECT_SAYS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
-// The centre of a voxel in the scene.
+// The centre of a voxel in the scene's frame (m).
 inline glm::dvec3 place_of(const voxel::LabelVolume& v, int i, int j, int k) {
   return v.origin_m + v.rotation * (glm::dvec3(i, j, k) * v.spacing_m);
 }

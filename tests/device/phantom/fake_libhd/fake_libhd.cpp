@@ -27,16 +27,16 @@ struct ErrorInfo {
 FakeHd control;
 std::atomic<std::int64_t> now_ns{1'000'000'000};
 
-std::mutex mutex;  // guards what follows
+std::mutex mutex;  // guards the variables below, up to `ends`
 std::condition_variable changed;
-std::vector<ErrorInfo> errors;  // a stack, as in the real library
+std::vector<ErrorInfo> errors;  // a stack of errors, as in the real library
 Callback asynchronous = nullptr, synchronous = nullptr;
 void *asynchronous_user = nullptr, *synchronous_user = nullptr;
 std::thread scheduler;
 bool ends = false;
 
-// Guards what follows. The scheduler's thread holds it for a whole tick, so that a thread that gives up on a
-// silent scheduler can open a frame of its own.
+// Guards the frame variables below. The scheduler's thread holds it for a whole tick. Another thread that has
+// given up on a silent scheduler can open a frame between ticks.
 std::recursive_mutex frames;
 bool in_frame = false, in_asynchronous = false, in_synchronous = false;
 double frame_force[3] = {0, 0, 0};
@@ -182,7 +182,7 @@ void hdEndFrame(unsigned /*handle*/) {
   const std::lock_guard lock(frames);
   if (!in_frame) ++control.misuse;
   in_frame = false;
-  // Not in the callback: another thread gave up on the scheduler.
+  // A frame outside the callbacks counts too: another thread opens it after giving up on the scheduler.
   if (!in_synchronous && force_set) {
     control.forces.push_back({control.ticks, {frame_force[0], frame_force[1], frame_force[2]}});
     if (control.last_force != nullptr) {
@@ -349,7 +349,7 @@ void hdUnschedule(unsigned long /*schedule*/) {
 
 #ifdef FAKE_HD_NEEDS_DRIVER
 extern "C" int fake_phantom_io();
-// A reference that prevents loading this library without the other one.
+// Refers to the other library, so that this one cannot be loaded without it.
 extern "C" int fake_hd_needs() {
   return fake_phantom_io();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A test double of libHD: a complete device behind the driver's C interface, with its own scheduler thread. A
-// test loads the same file as the program, finds `fake_hd` in it, and writes what shall happen.
+// test loads the same library file as the program and finds `fake_hd` in it. It writes the events that shall
+// happen into that struct.
 #pragma once
 
 #include <atomic>
@@ -8,7 +9,7 @@
 #include <vector>
 
 struct FakeHdForce {
-  std::uint64_t tick = 0;  // of the asynchronous callback; 0 is the first
+  std::uint64_t tick = 0;  // tick of the asynchronous callback, counted from 0
   double newton[3] = {0, 0, 0};
 };
 
@@ -17,23 +18,23 @@ struct FakeHd {
 
   // Timing. Unpaced ticks follow one another at once, and fake_hd_now_ns() counts them.
   bool paced = false;
-  int rate_hz = 1000;        // granted, whatever is requested
-  bool accepts_rate = true;  // false: an error, and the rate above stays
+  int rate_hz = 1000;        // the granted rate, whatever is requested
+  bool accepts_rate = true;  // false: a request is an error, and `rate_hz` stays
 
   // Opening.
   int failing_inits = 0;  // number of hdInitDevice calls that fail; -1: all
   unsigned init_error = 0x302;
-  unsigned start_error = 0;       // of hdStartScheduler
-  unsigned schedule_error = 0;    // of hdScheduleAsynchronous
-  unsigned calibration = 0x5000;  // of hdCheckCalibration, until it is updated
+  unsigned start_error = 0;       // error of hdStartScheduler; 0: none
+  unsigned schedule_error = 0;    // error of hdScheduleAsynchronous; 0: none
+  unsigned calibration = 0x5000;  // result of hdCheckCalibration until the calibration is updated
   unsigned calibration_after = 0x5000;
   int calibration_style = 4;
   bool has_safety_switch = false;
 
-  // On a tick.
+  // Events at ticks.
   std::uint64_t error_at = never, error_ticks = 1;
   unsigned error = 0;
-  bool error_after_force = false;  // reported at the frame's end instead of its start
+  bool error_after_force = false;  // the error is reported at the frame's end instead of its start
   std::uint64_t late_at = never;
   double late_s = 0.0;
   std::uint64_t nan_at = never;
@@ -46,19 +47,20 @@ struct FakeHd {
   double x_mm = 0.0, y_mm = 0.0, z_mm = 0.0, swing_mm = 20.0, hz = 1.0;
 
   // Observations.
-  std::vector<FakeHdForce> forces;  // at the end of each frame of the asynchronous callback
+  std::vector<FakeHdForce>
+      forces;  // the force of each frame in which a force was set, outside synchronous callbacks
   std::uint64_t ticks = 0;
   std::uint64_t misuse = 0;  // nested frames, forces outside of frames, calls in the wrong order
   int open_devices = 0, inits = 0;
   bool scheduler_runs = false;
-  std::vector<unsigned> updates;  // styles of hdUpdateCalibration
-  // Magnitude (N) in the last frame, for tests across processes.
+  std::vector<unsigned> updates;  // styles that hdUpdateCalibration was called with
+  // Magnitude of the force in the last frame (N), for tests across processes.
   std::atomic<double>* last_force = nullptr;
 };
 
 // Exported functions:
 //   FakeHd* fake_hd()              write before the device is opened, read after it is closed
 //   void fake_hd_reset()           restores the initial state
-//   std::int64_t fake_hd_now_ns()  its clock
-// The environment variable FAKE_HD sets the same fields where no test can:
+//   std::int64_t fake_hd_now_ns()  the clock of the double
+// The environment variable FAKE_HD sets the same fields if no test can set them:
 // "paced=1,error=0x302,error_at=500".

@@ -29,7 +29,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kMeshes = 6;
 
-// A report of `rigid` with times around `time_us`, as noisy as those of a machine with other work.
+// A report of the suite `rigid` with random times, as noisy as on a machine that does other work. The
+// product's times are multiplied by `slower`.
 BenchReport report_of(std::uint64_t seed, double slower = 1.0) {
   std::mt19937_64 random(seed);
   std::lognormal_distribution<double> noise(0.0, 0.1);
@@ -88,9 +89,9 @@ TEST(CompareReports, WhatTakesHalfAsLongAgainIsFoundAndNothingElse) {
       EXPECT_EQ(figure.verdict, Verdict::same);
     }
   }
-  EXPECT_EQ(overall, 2U);  // median and p99
+  EXPECT_EQ(overall, 2U);  // the median and p99
   EXPECT_GE(times, 4U * kMeshes);
-  // Of the rows, the longest time grew most.
+  // Of the figures of single rows, the longest times grew most.
   EXPECT_EQ(comparison.figures[overall].key, "max_us");
   for (std::size_t i = overall + 1; i < times; ++i)
     EXPECT_GE(comparison.figures[i - 1].noticed, comparison.figures[i].noticed);
@@ -117,7 +118,7 @@ TEST(CompareReports, FiveRunsFindWhatTakesLongerInEveryRow) {
   ASSERT_GT(changed_in(comparison), 0U);
   const ComparedFigure& first = comparison.figures.front();
   EXPECT_EQ(first.family, hybrid::bench::Family::overall);
-  // The geometric mean over the rows of the product, run by run.
+  // An overall figure of a run is the geometric mean over the product's rows.
   double log_sum = 0.0;
   const auto report = report_of(100);
   for (const Json& row : report.suites["rigid"])
@@ -135,7 +136,7 @@ TEST(CompareReports, AnyChangeOfACountIsOneAndIsShownExactly) {
   news[0].suites["rigid"][2]["steps_mean"] = 1.2500000000000002;
   const auto comparison = compare_reports(olds, news);
   EXPECT_EQ(changed_in(comparison), 2U);
-  EXPECT_EQ(comparison.figures[0].key, "pop_throughs");  // before the work
+  EXPECT_EQ(comparison.figures[0].key, "pop_throughs");  // listed before figures of the work
   EXPECT_EQ(comparison.figures[1].key, "steps_mean");
   EXPECT_NE(hybrid::bench::in_words(comparison, false).find("1.25 -> 1.2500000000000002"), std::string::npos);
 }
@@ -147,13 +148,14 @@ TEST(CompareReports, CountsThatDifferBetweenRunsOfABuildAreNoChange) {
     news[i].suites["rigid"][0]["steps_max"] = 5 + i;
   }
   EXPECT_EQ(changed_in(compare_reports(olds, news)), 0U);
-  for (auto& report : olds) report.suites["rigid"][0]["steps_max"] = 3;  // and now it was sure
+  for (auto& report : olds)
+    report.suites["rigid"][0]["steps_max"] = 3;  // now the old build has one definite value
   EXPECT_EQ(changed_in(compare_reports(olds, news)), 1U);
 }
 
 TEST(CompareReports, FiguresOfOtherTicksAreNotComparedExactly) {
   auto olds = reports_of(1, 1), news = reports_of(2, 1);
-  news[0].suites["rigid"][0]["ticks"] = 900;  // the time was up
+  news[0].suites["rigid"][0]["ticks"] = 900;  // the run ended early by its time limit
   news[0].suites["rigid"][0]["contact_ticks"] = 800;
   news[0].suites["rigid"][1]["error_ticks"] = 77;
   news[0].suites["rigid"][1]["error_lost_ticks"] = 5;
@@ -199,7 +201,7 @@ TEST(CompareReports, WhatIsNeverReachedComesAfterEveryTime) {
   EXPECT_NE(hybrid::bench::in_words(comparison, false).find("never"), std::string::npos);
 }
 
-// A key that is added to a row has to be added to report_keys.cpp, too.
+// A key that is added to a row must also be added to report_keys.cpp.
 TEST(CompareReports, EveryKeyOfEveryRowIsKnown) {
   const std::vector<std::pair<std::string, Json>> rows{
       {"rigid", hybrid::bench::to_json(hybrid::bench::RigidRow{})},
@@ -254,7 +256,7 @@ TEST(CompareReports, RefusesWhatIsNoReportWithThePlaceAndARemedy) {
   says(refusal(json.dump()), "suites.rigid[1] has no `mesh`");
   EXPECT_THROW((void)hybrid::bench::read_bench_report(folder / "none.json"), std::invalid_argument);
   EXPECT_THROW((void)hybrid::bench::read_bench_report(folder), std::invalid_argument);
-  // A copy is no repeat.
+  // A copy of a report does not count as another run.
   for (const char* name : {"a.json", "b.json"})
     std::ofstream(folder / name) << Json{{"command", "bench"}, {"suites", report_of(1).suites}}.dump();
   EXPECT_THROW((void)hybrid::bench::read_bench_reports({folder / "a.json", folder / "b.json"}),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rank test against all permutations, its approximation against the exact test, and how often a sample is
-// told from another of the same distribution.
+// The rank test against all permutations, its approximation against the exact test, and how often it calls
+// two samples of the same distribution different.
 #include "hybrid/bench/reports/rank_test.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using hybrid::bench::benjamini_hochberg;
 using hybrid::bench::least_p;
 using hybrid::bench::rank_test;
 
-// Pairs in which the value of the second sample is greater, by looking at each; a tie counts half.
+// Number of pairs in which the value of the second sample is greater, by brute force. A tie counts half.
 double pairs(const std::vector<double>& first, const std::vector<double>& second) {
   double u = 0.0;
   for (const double a : first) {
@@ -27,7 +27,8 @@ double pairs(const std::vector<double>& first, const std::vector<double>& second
   return u;
 }
 
-// The share of all ways to deal the values to samples of these sizes that are as far from the middle.
+// p by brute force: of all ways to divide the values into samples of these sizes, the fraction whose u is at
+// least as far from the middle.
 double p_of_all_permutations(const std::vector<double>& first, const std::vector<double>& second) {
   std::vector<double> values = first;
   values.insert(values.end(), second.begin(), second.end());
@@ -74,7 +75,7 @@ TEST(RankTest, TheLeastPIsThatOfSamplesThatDoNotOverlap) {
     EXPECT_NEAR(rank_test(low, high).p, least_p(n, n), 1e-12) << n;
   }
   EXPECT_DOUBLE_EQ(least_p(4, 4), 2.0 / 70.0);
-  EXPECT_EQ(hybrid::bench::size_for(0.05), 4U);  // 3 of each have at least 0.1
+  EXPECT_EQ(hybrid::bench::size_for(0.05), 4U);  // with 3 values each, p is at least 0.1
   EXPECT_GT(least_p(3, 3), 0.05);
   for (const double p : {0.01, 1e-3, 1e-6}) {
     const std::size_t size = hybrid::bench::size_for(p);
@@ -102,7 +103,8 @@ TEST(RankTest, NothingIsToldFromNothingOrFromTheSame) {
   EXPECT_EQ(rank_test(many, many).p, 1.0);
 }
 
-// The definition: of sorted p, the greatest k with p(k) <= rate k / m, and all before it.
+// The definition: with sorted p, find the greatest k with p(k) <= rate · k / m. The first k figures are
+// called different.
 TEST(RankTest, BenjaminiHochbergIsItsDefinition) {
   std::mt19937_64 random(13);
   for (int i = 0; i < 200; ++i) {
@@ -136,11 +138,11 @@ TEST(RankTest, QuartilesOfKnownSamples) {
 }
 
 constexpr int kComparisons = 2000;
-// Share of comparisons of equal distributions in which any of the figures is called different. `common` is
-// the share of a run's noise that all its figures have in common.
+// Fraction of comparisons of equal distributions in which at least one figure is called different. `common`
+// is the fraction of a run's noise that all its figures share.
 double called_changed(std::size_t runs, std::size_t figures, double common) {
   std::mt19937_64 random(17);
-  std::map<double, double> known;  // p of u, because no values tie
+  std::map<double, double> known;  // p by u; u alone decides, because no values tie
   std::normal_distribution<double> noise;
   int called = 0;
   for (int comparison = 0; comparison < kComparisons; ++comparison) {
@@ -164,7 +166,7 @@ double called_changed(std::size_t runs, std::size_t figures, double common) {
 }
 
 TEST(RankTest, EqualDistributionsAreToldApartInAtMostFiveOfAHundred) {
-  // So many come up by chance in one of a thousand simulations where five of a hundred is exact.
+  // If the true rate is exactly 5 %, one simulation in a thousand exceeds this rate by chance.
   const double most = 0.05 + 3.1 * std::sqrt(0.05 * 0.95 / kComparisons);
   for (const std::size_t runs : {std::size_t{4}, std::size_t{5}, std::size_t{9}}) {
     for (const double common : {0.0, 0.5, 0.9, 1.0}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bodies on a path beside tissue: the tissue gives way and comes back, and nothing overlaps after any tick.
+// Bodies on a path beside tissue. The tissue gives way and returns, and nothing overlaps after any tick.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,14 +26,14 @@ using tests::Touch;
 
 constexpr dvec3 kFarAway(0.0, 0.0, 0.2);
 constexpr double kSpacing = 2e-3;
-constexpr double kOverlap = 0.05;  // of the spacing
+constexpr double kOverlap = 0.05;  // largest allowed overlap (spacings)
 constexpr double kBack_m = 1e-3 * kSpacing;
 constexpr double kLinks_m = 1e-8;
 
 struct Shape {
   const char* name;
   std::string text;
-  double lowest_mm;  // below the initial position
+  double lowest_mm;  // lowest point below the body's position
 };
 
 class BodyTissue : public tests::SceneFile {
@@ -42,14 +42,15 @@ class BodyTissue : public tests::SceneFile {
     return "format = 1\n[tool]\nradius = 5\nstiffness = 1000\n" + tests::unlimited +
            "[material.gel]\nyoung = 5000\npoisson = 0.3\n";
   }
-  // The upper face is at z = 0.
+  // A block of tissue with its upper face at z = 0.
   static std::string block() {
     return head() +
            "[[soft]]\nname = \"block\"\nformula = \"block\"\n"
            "size = [60, 60, 24]\nspacing = 2\nposition = [0, 0, -12]\nmaterial = \"gel\"\n" +
            tests::some_path;
   }
-  // Straight down to `deep_mm` below first contact, along by `along_mm`, a stop there, and up.
+  // A body that moves straight down to `deep_mm` below first contact, sideways by `along_mm`, stops there,
+  // and moves up.
   static std::string pusher(const Shape& shape, double deep_mm, double along_mm, double speed_mm_per_s,
                             double stay_s = 0.0) {
     const double above = shape.lowest_mm + 3.0, below = shape.lowest_mm - deep_mm, from = -0.5 * along_mm;
@@ -137,7 +138,7 @@ TEST_F(BodyTissue, LeavesTheWayOfABodyAtAnySpeedAndComesBack) {
   }
 }
 
-// At 1 m/s a body moves two of these spacings in a tick.
+// At 1 m/s a body moves by two spacings of this block per tick.
 TEST_F(BodyTissue, LeavesTheWayOfABodyThatGoesSpacingsInATick) {
   const std::string fine = head() +
                            "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [22.5, 22.5, 7]\n"
@@ -157,8 +158,8 @@ TEST_F(BodyTissue, LeavesTheWayOfABodyThatGoesSpacingsInATick) {
   }
 }
 
-// When the body advances, the energy in the springs grows by the work of the force that the anchors carry,
-// and no other force acts.
+// When the body advances, the energy in the springs grows by the work of the force that the anchors carry. No
+// other force acts.
 TEST_F(BodyTissue, StandingInTissueABodyIsCarriedByItsAnchors) {
   for (const bool asynchronous : {false, true}) {
     std::array<double, 2> energy{}, force{};
@@ -200,7 +201,7 @@ TEST_F(BodyTissue, ABarSlidesAcrossTheSurface) {
   }
 }
 
-// The tool rests on tissue that a ball pushes from the side. From tick to tick the proxy moves no further
+// The tool rests on tissue that a ball pushes from the side. From tick to tick, the proxy moves no further
 // than the tissue under it.
 TEST_F(BodyTissue, AToolThatRestsOnTheTissueFeelsABodyBesideIt) {
   const std::string ball =
@@ -246,7 +247,8 @@ TEST_F(BodyTissue, AToolThatRestsOnTheTissueFeelsABodyBesideIt) {
   }
 }
 
-// Deeper than links let tissue be squeezed: bone wins, the body overlaps, and a fault reports the overlap.
+// The body moves deeper than the links allow the tissue to be squeezed. The tissue stays out of the bone,
+// overlaps the body instead, and a fault reports this.
 TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
   const std::string slab = head() +
                            "[[soft]]\nname = \"slab\"\nformula = \"block\"\n"
@@ -256,7 +258,7 @@ TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
   const std::string plate =
       "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [80, 60, 6]\nposition = [0, 0, -12]\n";
   for (const Shape& shape : shapes()) {
-    if (shape.name == std::string("small ball")) continue;  // as small as a voxel, it parts them
+    if (shape.name == std::string("small ball")) continue;  // it is as small as a voxel, and parts the voxels
     for (const double along : {0.0, 10.0}) {
       for (const bool asynchronous : {false, true}) {
         const double speed = asynchronous ? 1000.0 : 200.0;
@@ -312,7 +314,7 @@ TEST_F(BodyTissue, SqueezedOntoAnchorsItComesBack) {
   }
 }
 
-// More voxels than a tick examines: a fault reports it, and nothing else happens.
+// The body meets more voxels than a tick examines. A fault reports this, and the tissue stays sound.
 TEST_F(BodyTissue, ABodyThatComesToTooManyVoxelsSaysSo) {
   const std::string sheet =
       head() +
@@ -367,7 +369,7 @@ TEST(SignedDistance, SaysTheWayOutFromEitherSide) {
   const auto capsule = polygon::make_capsule_surface(0.005, 0.01);
   check(*capsule, {0.004, 0.0, 0.005}, x, -0.001);
   polygon::SignedDistance near;
-  // On the surface the result is the previous one.
+  // On the surface itself, the direction is that of the given previous normal.
   EXPECT_FALSE(polygon::signed_distance(*ball, 0.01 * z, 1.0, dvec3(0.0), near));
   ASSERT_TRUE(polygon::signed_distance(*ball, 0.01 * z, 1.0, x, near));
   EXPECT_EQ(near.normal, x);

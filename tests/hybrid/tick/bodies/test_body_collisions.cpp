@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Free bodies and rigid objects: against closed forms and conservation laws, and overlap measured at points
+// Free bodies and rigid objects, against closed forms and conservation laws. Overlap is measured at points
 // that the tick does not use.
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ const std::string kTable =
 const std::string kSheet = "primitive = \"plane\"\nsize = 300\n";
 const std::string kThin = "primitive = \"box\"\nsize = [300, 300, 1]\n";
 
-// Points of the surface: uniform, and denser along edges.
+// Random points of the surface, denser along edges.
 std::vector<dvec3> seen_points(const hybrid::RigidObject& object, std::mt19937& engine) {
   std::vector<dvec3> points;
   const polygon::TriangleMesh& mesh = *object.drawn;
@@ -71,7 +71,7 @@ std::vector<dvec3> seen_points(const hybrid::RigidObject& object, std::mt19937& 
   return points;
 }
 
-// Depth of objects a and b in each other (m), without sheets.
+// Depth of the objects a and b in each other (m). Sheets have none.
 class Overlap {
  public:
   Overlap(Touch& touch, std::size_t a, std::size_t b) : touch_(touch), pair_{a, b} {
@@ -121,7 +121,7 @@ TEST_F(BodyCollisions, WhatIsDroppedComesToRestOnWhatStands) {
   struct Case {
     const char* name;
     std::string shape;
-    double rest_mm;  // its centre above the table
+    double rest_mm;  // height of its centre above the table at rest
   };
   const std::string damped = kFalls + "drag = 0.02\nangular_drag = 1e-6\n";
   const std::vector<Case> cases{{"ball", kBall, 8.0},
@@ -165,7 +165,7 @@ TEST_F(BodyCollisions, WhatIsDroppedComesToRestOnWhatStands) {
   }
 }
 
-// At up to 20 m/s, the travel in a tick is longer than the body.
+// At up to 20 m/s, a body moves further per tick than its own length.
 TEST_F(BodyCollisions, NothingPassesThroughAnythingAtAnySpeed) {
   polygon::save_ply(folder_ / "sphere.ply", polygon::make_ball_mesh(0.009, 3));
   const std::string mesh = "mesh = \"sphere.ply\"\nunit = \"m\"\n";
@@ -251,8 +251,8 @@ TEST_F(BodyCollisions, MomentumIsKeptAndNoEnergyGained) {
   EXPECT_LE(turned, 0.02) << "places are put right by microns";
 }
 
-// A ball hits another centrally and without friction: both continue at the speed of their common centre of
-// mass.
+// A ball hits another one centrally and without friction. Both continue at the speed of their common centre
+// of mass.
 TEST_F(BodyCollisions, WhatMeetsHeadOnGoesOnTogether) {
   Touch touch(load(kHead + free(kBall, {0, 0, 0}, "") + another("other", kBall, {30, 0, 0}, "")), kFarAway);
   touch.state().rigid[0].free.velocity_m_per_s = {0.5, 0, 0};
@@ -263,7 +263,7 @@ TEST_F(BodyCollisions, WhatMeetsHeadOnGoesOnTogether) {
   }
 }
 
-// On a slope a block stays if the slope's tangent is below the coefficient of friction, and otherwise slides
+// A block on a slope stays if the slope's tangent is below the coefficient of friction. Otherwise it slides
 // by Coulomb's law.
 TEST_F(BodyCollisions, OnASlopeFrictionHoldsUpToItsCone) {
   const double friction = 0.4, degrees = glm::pi<double>() / 180.0;
@@ -305,7 +305,7 @@ TEST_F(BodyCollisions, ABeltTakesAlongWhatLiesOnIt) {
                          rough + "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 100\n"
                                  "points = [[0, 0, -10], [100, 0, -10]]\n")),
               kFarAway);
-  // The block slides until it reaches the speed of the belt: v / (mu g).
+  // The block slides for v / (mu g), until it has the speed of the belt.
   const double slides_s = 0.1 / (0.5 * kGravity);
   for (int n = 0; n < 500; ++n) touch.at(kFarAway);
   EXPECT_NEAR(state_of(touch, 0).velocity_m_per_s.x, 0.1, 1e-4);
@@ -334,7 +334,7 @@ TEST_F(BodyCollisions, AStackStands) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// A body on a path keeps its motion, and a body without any space left is not thrown.
+// A body on a path keeps its motion. A body without space between two others is not thrown.
 TEST_F(BodyCollisions, SqueezedBetweenTwoItIsAFaultAndStaysFinite) {
   const std::string piston =
       "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 20\npoints = [[0, 0, 40], [0, 0, "
@@ -355,7 +355,7 @@ TEST_F(BodyCollisions, SqueezedBetweenTwoItIsAFaultAndStaysFinite) {
   }
 }
 
-// The tool pushes a puck against a wall: the hand feels the wall.
+// The tool pushes a puck against a wall, and the hand feels the wall.
 TEST_F(BodyCollisions, TheToolFeelsTheWallThroughABody) {
   Touch touch(load(kHead + free("primitive = \"box\"\nsize = [20, 20, 20]\n", {0, 0, 10.01}) +
                    rigid("table", kTable, {0, 0, -10}) +
@@ -367,7 +367,7 @@ TEST_F(BodyCollisions, TheToolFeelsTheWallThroughABody) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// Two knobbly meshes, edge against edge: the overlap is at most the depth that can lie between sample points.
+// Knobbly meshes, and edge against edge. The overlap is at most the depth that fits between sample points.
 TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
   polygon::TriangleMesh knobs = polygon::make_ball_mesh(0.02, 4);
   for (dvec3& v : knobs.vertices)
@@ -407,7 +407,7 @@ TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
   }
 }
 
-// Beside tissue: a ball falls past the tissue onto bone, and presses against bone there.
+// A ball falls past tissue onto bone, and rests there.
 TEST_F(BodyCollisions, BesideTissueBoneStopsIt) {
   Touch touch(
       load(kHead + free(kBall, {0, 0, 30}) + rigid("bone", kTable, {0, 0, -10}) +
@@ -420,7 +420,7 @@ TEST_F(BodyCollisions, BesideTissueBoneStopsIt) {
     touch.at(kFarAway);
     worst = std::max(worst, overlap.deepest());
   }
-  // The tissue that it fell onto threw it aside by a millimeter.
+  // It rests on the bone with its radius of 8 mm.
   EXPECT_NEAR(state_of(touch, 0).centre_m.z, 0.008, 2e-5);
   EXPECT_EQ(worst, 0.0);
   EXPECT_EQ(touch.state().faults, 0U);

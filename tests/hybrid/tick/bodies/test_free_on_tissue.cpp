@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Free bodies beside tissue: the tissue carries, stops and reflects them, and nothing overlaps.
+// Free bodies beside tissue. The tissue carries, stops and reflects them, and nothing overlaps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,9 +16,11 @@ namespace {
 
 using glm::dvec3;
 using tests::Touch;
-using namespace tests::free_on_tissue;  // NOLINT(google-build-using-namespace): the vocabulary of these tests
+using namespace tests::free_on_tissue;  // NOLINT(google-build-using-namespace): these tests use the whole
+                                        // fixture
 
-// Dropped by a millimeter. A ball on a path to the same place must be carried equally.
+// The ball is dropped from a height of 1 mm. A ball that is moved to the same place on a path must be carried
+// equally.
 TEST_F(FreeOnTissue, ABallComesToRestAndItsWeightIsCarried) {
   const double weight = 0.02 * 9.81;
   for (const bool asynchronous : {false, true}) {
@@ -43,8 +45,8 @@ TEST_F(FreeOnTissue, ABallComesToRestAndItsWeightIsCarried) {
   }
 }
 
-// So deep that links are at their limits. Springs across the layer of anchors carry everything, because no
-// link is at its limit there.
+// The body lies so deep that links are at their limits. No link at the anchors is at its limit, so the
+// springs there carry everything.
 TEST_F(FreeOnTissue, OnTightLinksABodyComesToRestAndItsWeightIsCarried) {
   struct Case {
     std::string name, shape;
@@ -71,7 +73,7 @@ TEST_F(FreeOnTissue, OnTightLinksABodyComesToRestAndItsWeightIsCarried) {
       EXPECT_LE(worst, kOverlap);
       EXPECT_EQ(touch.state().faults, 0U);
       if (c.shape != kBall) continue;
-      // At the same place on a path, the body must be carried equally.
+      // A body that is moved to the same place on a path must be carried equally.
       const dvec3 rest_mm = 1e3 * touch.state().rigid[0].pose.position_m;
       Touch held(load(block(c.young_Pa) + pushed_to(rest_mm)), kFarAway, asynchronous);
       double worst_held = 0.0;
@@ -85,11 +87,11 @@ TEST_F(FreeOnTissue, OnTightLinksABodyComesToRestAndItsWeightIsCarried) {
   }
 }
 
-// Two bodies that share the tissue between them, on links at their limits: each presses with its own share.
+// Two bodies lie on the same tissue, with links at their limits. The tissue carries both weights.
 TEST_F(FreeOnTissue, TwoBodiesInOneObjectComeToRestAndAreBothCarried) {
   const std::string box = "primitive = \"box\"\nsize = [14, 10, 12]\n";
   struct Case {
-    std::string shape;  // of the second body
+    std::string shape;  // shape of the second body
     double mass_kg, x_mm;
   };
   for (const Case& c : {Case{kBall, 0.02, 14.0}, Case{box, 0.05, 14.0}}) {
@@ -119,8 +121,9 @@ TEST_F(FreeOnTissue, TwoBodiesInOneObjectComeToRestAndAreBothCarried) {
   }
 }
 
-// The pressing force is the slope of the springs' energy, with either relaxation. (The weight of the same box
-// at rest there is a different force: as it turned, other voxels came to lie beside it.)
+// The carried force is the derivative of the springs' energy by the body's way, with either kind of
+// relaxation. For a free box at the same place it may differ, because other voxels lie beside a box that has
+// turned.
 TEST_F(FreeOnTissue, OnTightLinksABodyThatIsHeldIsCarriedByWhatItsWayTakes) {
   struct Case {
     std::string name, shape;
@@ -134,7 +137,7 @@ TEST_F(FreeOnTissue, OnTightLinksABodyThatIsHeldIsCarriedByWhatItsWayTakes) {
         Case{"box on corner", box + "rotation = [40, 30, 10]\n", -1.0},
         Case{"capsule", "primitive = \"capsule\"\nradius = 4\nlength = 20\nrotation = [90, 0, 20]\n",
              -1.0}}) {
-    std::array<double, 2> energy_J{}, carried{};  // a little further in the second
+    std::array<double, 2> energy_J{}, carried{};  // [1] is a little deeper
     double apart_N = 0.0;
     for (const int n : {0, 1, 2}) {
       SCOPED_TRACE(c.name + (n == 2 ? ", relaxed apart" : ", in the tick"));
@@ -162,8 +165,8 @@ TEST_F(FreeOnTissue, OnTightLinksABodyThatIsHeldIsCarriedByWhatItsWayTakes) {
   }
 }
 
-// Anchors carry the body through links at their limits, whose forces the springs do not show. The body must
-// still come to rest there, wherever it first meets the lattice, and hardly bounce.
+// Anchors carry the body through links at their limits, whose forces the springs do not show. Wherever the
+// body first meets the lattice, it must come to rest and hardly bounce.
 TEST_F(FreeOnTissue, SoHeavyThatItSqueezesItOntoItsAnchorsABallComesToRest) {
   struct Case {
     double mass_kg, young_Pa, x_mm;
@@ -195,7 +198,7 @@ TEST_F(FreeOnTissue, SoHeavyThatItSqueezesItOntoItsAnchorsABallComesToRest) {
   }
 }
 
-// Between two results asynchronously relaxed tissue is a spring; this must not sustain a bounce.
+// Between two results, asynchronously relaxed tissue acts as a spring. This must not sustain a bounce.
 TEST_F(FreeOnTissue, ADroppedWeightComesToRest) {
   for (const bool asynchronous : {false, true}) {
     SCOPED_TRACE(asynchronous ? "relaxed apart" : "in the tick");
@@ -206,7 +209,9 @@ TEST_F(FreeOnTissue, ADroppedWeightComesToRest) {
     double fastest = 0.0;
     for (int n = 0; n < 200; ++n) {
       touch.at(kFarAway);
-      fastest = std::max(fastest, std::abs(free_body(touch).velocity_m_per_s.z));  // over tissue it slides
+      fastest =
+          std::max(fastest, std::abs(free_body(touch).velocity_m_per_s.z));  // only vertically, because the
+                                                                             // body may slide over the tissue
     }
     EXPECT_LT(fastest, 1e-3);
     EXPECT_NEAR(carried_N(touch), weight, 0.02 * weight);
@@ -238,8 +243,8 @@ TEST_F(FreeOnTissue, HeldStillByTheToolHandAndAnchorsBalance) {
   }
 }
 
-// A slab anchored at one side over a plate, the body on the slab, and the tool on the body: pressed down
-// until links of the slab are at their limits.
+// A slab that is anchored at one side lies above a plate. A body lies on the slab, and the tool presses on
+// the body until links of the slab are at their limits.
 TEST_F(FreeOnTissue, SqueezedBetweenToolTissueAndBoneItStaysOutOfBoth) {
   const std::string slab =
       head(5e3) +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Moving bodies in the whole tick: they push and carry the tool, and free bodies never gain more energy than
+// Moving bodies in the whole tick. They push and carry the tool, and free bodies never gain more energy than
 // they are given.
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 
 namespace {
 
-using namespace tests;  // NOLINT(google-build-using-namespace): the vocabulary of these tests
+using namespace tests;  // NOLINT(google-build-using-namespace): these tests use the whole fixture
 
 class Motion : public Feel {
  protected:
@@ -89,7 +89,7 @@ TEST_F(Motion, ATurntableCarriesTheToolRoundAndAWheelToo) {
   struct Case {
     const char* name;
     RigidDescription object;
-    dvec3 axis, from;  // the pressed device's position
+    dvec3 axis, from;  // axis of rotation, and the device's position when pressed
   };
   const std::vector<Case> cases{
       {"turntable",
@@ -103,7 +103,7 @@ TEST_F(Motion, ATurntableCarriesTheToolRoundAndAWheelToo) {
     double worst = 0.0, force = 0.0;
     dvec3 held(0.0);
     for (int n = 0; n < 4000; ++n) {
-      // The device turns with the body.
+      // The device rotates with the body.
       const glm::dquat turn = glm::angleAxis(rate * 1e-3 * (n + 1), c.axis);
       const dvec3 above = c.from + dvec3(0, 0, n < 20 ? 5e-3 : 0.0);
       const TickResult felt = touch.at(turn * above);
@@ -124,7 +124,7 @@ TEST_F(Motion, ATurntableCarriesTheToolRoundAndAWheelToo) {
 }
 
 TEST_F(Motion, AWheelUnderAStandingToolRubsAtTheDynamicCone) {
-  for (const double rate : {0.05, 2.0, 20.0}) {  // 1 m/s at its rim
+  for (const double rate : {0.05, 2.0, 20.0}) {  // the last is 1 m/s at the rim
     Touch touch(scene_of({turning(rough(ball()), {0, 1, 0}, rate)}, kRadius), {0, 0, 0.09});
     touch.go({0, 0, 0.06}, 1e-3);
     std::vector<double> rubbed;
@@ -160,7 +160,7 @@ TEST_F(Motion, ABodyThatStandsOnItsPathFeelsAsAFixedOne) {
   EXPECT_LE(worst, 1e-4);
 }
 
-// The hand's work equals the body's energy plus the losses to friction and drag, or more.
+// The hand's work is at least the body's energy, because friction and drag only lose energy.
 TEST_F(Motion, AFreeBodyHasNoMoreEnergyThanTheHandGave) {
   for (const double mass : {0.001, 0.05, 2.0}) {
     for (const bool friction : {false, true}) {
@@ -170,7 +170,7 @@ TEST_F(Motion, AFreeBodyHasNoMoreEnergyThanTheHandGave) {
         Touch touch(scene_of({free(puck, mass)}, kRadius), {-0.04, off_centre, 0});
         Work work;
         double most = 0.0, excess = -1e9;
-        // Pushed for 0.1 s with a lateral oscillation; then the hand stops.
+        // The hand pushes for 0.1 s with a lateral oscillation, then stops.
         for (int n = 0; n < 1000; ++n) {
           const double t = std::min(1e-3 * n, 0.1);
           const TickResult felt = touch.at({-0.025 + 0.25 * t, off_centre + 2e-3 * std::sin(40.0 * t), 0});
@@ -206,19 +206,19 @@ TEST_F(Motion, APuckPushedSteadilyFeelsItsDrag) {
   TickResult felt;
   for (int n = 0; n < 3000; ++n) felt = touch.at({-0.02 + speed * 1e-3 * n, 0, 0});
   std::printf("puck with drag: %.4f N of %.4f N\n", -felt.force_N.x, drag * speed);
-  // The body gives way within the tick, so the coupling's force at the end of the tick pushes it: K v dt less
-  // than the hand feels.
+  // The body gives way within the tick. So the force at the end of the tick, which pushes the body, is K v dt
+  // less than the felt force.
   EXPECT_NEAR(-felt.force_N.x, drag * speed, 1.01 * kToolStiffness * speed * 1e-3);
   EXPECT_GE(-felt.force_N.x, drag * speed - 1e-9);
 }
 
-// The reference for the tick's force: everything in its present state, with the bodies at rest.
+// The reference for the tick's force is the equilibrium of the present state, with the bodies at rest.
 TEST_F(Motion, TheEquilibriumOfACopyIsWhatIsFeltNow) {
   RigidDescription wheel = turning(rough(ball()), {0, 1, 0}, 1.0);
   wheel.feel.shading = true;
   Touch touch(scene_of({wheel}, kRadius), {0, 0, 0.09});
   touch.go({0, 0, 0.06}, 1e-3);
-  for (const int ticks : {20, 500}) {  // static, and then sliding
+  for (const int ticks : {20, 500}) {  // first sticking, then sliding
     const TickResult felt = touch.go({0, 0, kBall - 1e-3}, 1e-3, ticks);
     const std::uint64_t before = hybrid::hash_state(0, touch.state());
     const double time_s = touch.state().clock.now_s();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Free bodies thrown at tissue: no overlap, no gain of energy, and a clean release.
+// Free bodies thrown at tissue: they do not overlap it, gain no energy, and leave it cleanly.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,9 +20,10 @@ namespace {
 
 using glm::dvec3;
 using tests::Touch;
-using namespace tests::free_on_tissue;  // NOLINT(google-build-using-namespace): the vocabulary of these tests
+using namespace tests::free_on_tissue;  // NOLINT(google-build-using-namespace): these tests use the whole
+                                        // fixture
 
-// Tissue gives back less energy than it took: the energy is that of the body alone.
+// Tissue returns less energy than it took. The compared energy is that of the body without the tissue.
 TEST_F(FreeOnTissue, ThrownAtItABodyNeitherOverlapsNorGainsEnergy) {
   for (const std::string& shape : {kBall, kBox}) {
     for (const double mass : {1e-3, 0.1, 10.0}) {

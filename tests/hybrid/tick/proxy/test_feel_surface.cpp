@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shading, texture and damping in the whole tick: a force along the normal of the surface that the facets
-// approximate, a relief at its wavelength, and damping that only resists.
+// Shading, texture and damping in the whole tick. The shaded force is along the normal of the surface that
+// the facets approximate. A relief has its wavelength, and damping only resists.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,17 +14,18 @@
 
 namespace {
 
-using namespace tests;  // NOLINT(google-build-using-namespace): the vocabulary of these tests
+using namespace tests;  // NOLINT(google-build-using-namespace): these tests use the whole fixture
 
 // ---- shading
 
 struct Slide {
-  std::vector<double> degrees, step_N;  // force to the sphere's normal; from tick to tick
+  std::vector<double> degrees,
+      step_N;  // [tick] angle between force and sphere's normal; change of the force since the last tick
   double least_N = 1e9, most_N = 0.0;
 };
 
-// The path `slide`: the device 5 mm below the sphere, the contact at 0.1 m/s along a spiral from pole to
-// pole.
+// Runs the path `slide`. The device is 5 mm below the sphere, and the contact moves at 0.1 m/s along a spiral
+// from pole to pole.
 Slide slide_spiral(Touch& touch) {
   const double th0 = 0.3, duration = 20.0, rate = (glm::pi<double>() - 2.0 * th0) / duration, speed = 0.1;
   const double around = std::sqrt(speed * speed - kBall * kBall * rate * rate);
@@ -56,9 +57,9 @@ double p99(const std::vector<double>& sorted) {
 
 class Shading : public Feel, public ::testing::WithParamInterface<double> {};
 
-// The reference normal is the sphere's at the proxy: the direction from the ball's centre to the proxy. The
-// normal at the device is the same within the measured angle, because the force is directed from device to
-// proxy.
+// The reference normal is the sphere's normal at the proxy, the direction from the ball's centre to the
+// proxy. At the device it is the same within the measured angle, because the force points from the device to
+// the proxy.
 TEST_P(Shading, TurnsTheForceToTheSphereThatTheFacetsStandFor) {
   RigidDescription flat = ball(), smooth = ball();
   smooth.feel.shading = true;
@@ -83,7 +84,7 @@ TEST_P(Shading, TurnsTheForceToTheSphereThatTheFacetsStandFor) {
 INSTANTIATE_TEST_SUITE_P(Tools, Shading, ::testing::Values(0.0, 2e-3),
                          [](const auto& tool) { return tool.param > 0.0 ? "ABallOf2mm" : "APoint"; });
 
-// A force along shaded normals has no potential, but the energy that it can give is small.
+// A force along shaded normals has no potential, but it can give only little energy.
 TEST_F(Feel, ShadingOnARoughBallGivesTheHandNothing) {
   RigidDescription smooth = rough(ball());
   smooth.feel.shading = true;
@@ -111,9 +112,10 @@ TEST_F(Feel, ShadingOnARoughBallGivesTheHandNothing) {
 
 // ---- texture
 
-// Amplitude of the lateral force along x at a wavelength, over a slide of `length_m`.
+// The strongest wavelength of a force over a slide of `length_m`.
 struct Spectrum {
-  double peak_m = 0.0, bin = 0.0;  // wavelength of the highest peak; its distance in bins
+  double peak_m = 0.0,
+         bin = 0.0;  // wavelength of the highest peak; the peak's distance from the wanted line in bins
 };
 Spectrum strongest(const std::vector<double>& force, double length_m, double wavelength_m) {
   Spectrum out;
@@ -140,7 +142,7 @@ class Texture : public Feel {
     RigidDescription plate = rigid("plate", hybrid::BoxPrimitive{{0.2, 0.1, 0.02}}, {0, 0, -0.01});
     hybrid::TextureDescription texture;
     texture.mapping = {.kind = kind, .along = hybrid::TextureAlong::z, .size_m = 5e-3, .height_m = 4e-4};
-    if (image) {  // one period: bright on the left
+    if (image) {  // an image of one period, bright on the left
       const int side = 64;
       std::vector<std::uint8_t> rgb;
       for (int y = 0; y < side; ++y) {
@@ -163,7 +165,7 @@ TEST_F(Texture, TheForceHasItsWavelength) {
         touch.go({-0.06, 0.001, 1e-3}, 1e-3);
         touch.go({-0.05, 0.001, 1e-3}, 1e-4);
         std::vector<double> along, normal;
-        const double length = 0.1;  // 20 periods
+        const double length = 0.1;  // (m) 20 periods
         touch.go({-0.05 + length, 0.001, 1e-3}, 1e-4, 0, [&](const TickResult& felt) {
           along.push_back(felt.force_N.x);
           normal.push_back(felt.force_N.z);
@@ -189,7 +191,7 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
     for (const bool friction : {false, true}) {
       RigidDescription plate = textured(image, hybrid::TextureKind::height);
       plate.feel.texture->mapping.size_m =
-          2e-3;  // finer than deep: the case in which a relief can create energy
+          2e-3;  // (m) so fine for its height that a relief could create energy
       plate.feel.texture->mapping.height_m = 5e-4;
       if (friction) plate = rough(plate);
       for (const Way& way : ways_on_the_flat()) {
@@ -197,8 +199,8 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
         const Gain gain = closed_way(touch, {0, 0, 0.01}, way.at, 2, 2e-6);
         std::printf("energy, %s%s, %s: the hand gains %+.3g mJ\n", image ? "image" : "pattern",
                     friction ? ", rough" : "", way.name, 1e3 * gain.work_J);
-        // Between ticks the force is not linear along the path, which leaves an error of the trapezoidal rule
-        // (for an image's spline; it vanishes with the step): a millionth of the energy exchanged.
+        // Between ticks the force is not linear along the path. So the trapezoidal rule has an error of a
+        // millionth of the exchanged energy. It vanishes with the step.
         EXPECT_LE(gain.work_J, friction ? 0.0 : 1e-8);
       }
     }
@@ -208,7 +210,7 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
 // ---- damping
 
 TEST_F(Feel, DampingResistsTheWayInNeverPullsAndEndsWithTheMotion) {
-  const double damping = 2.0, depth = 3e-3, speed = 0.1;  // N s/m; m; m/s
+  const double damping = 2.0, depth = 3e-3, speed = 0.1;  // units: N s/m, m, m/s
   RigidDescription plate = box();
   plate.feel.damping_N_s_per_m = damping;
   Touch touch(scene_of({plate}, kRadius), {0, 0, 0.02});
@@ -243,8 +245,9 @@ TEST_F(Feel, DampingResistsTheWayInNeverPullsAndEndsWithTheMotion) {
   EXPECT_LE(work.gained_J(), 0.0);
 }
 
-// A sampled damper lags by half a tick; shaken faster than a third of the rate it gives energy instead of
-// taking it. The tick detects this and disables the damper (surface_feel.h), so that no more energy is given.
+// A sampled damper lags by half a tick. If it is shaken faster than a third of the rate, it gives energy
+// instead of taking it. The tick detects this and suspends the damper (surface_feel.h), so that it gives no
+// more energy.
 TEST_F(Feel, DampingFeedsNoShaking) {
   RigidDescription plate = box();
   for (const double damping : {1.0, 10.0, 100.0}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Friction in the whole tick: at its coefficients, and never a source of energy.
+// Friction in the whole tick. It has the given coefficients and is never a source of energy.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,19 +12,19 @@
 
 namespace {
 
-using namespace tests;  // NOLINT(google-build-using-namespace): the vocabulary of these tests
+using namespace tests;  // NOLINT(google-build-using-namespace): these tests use the whole fixture
 
 // ---- friction: the cones
 
 struct Ramp {
-  double breakaway = 0.0;              // tan of the angle at which sliding began
-  std::vector<double> sliding;         // tan of the force's angle, each tick of the slide
+  double breakaway = 0.0;              // tangent of the angle at which sliding began
+  std::vector<double> sliding;         // [tick of the slide] tangent of the force's angle
   double crept_m = 0.0;                // travel of the proxy before sliding
   std::vector<double> normal_degrees;  // between the reference normal and the ideal one
 };
 
-// Presses at `from`, then drags by `step` per tick until the proxy has slid for `slide` ticks. Angles are
-// between the force and the normal of the touched surface.
+// Moves the device along device(tick) until the proxy has slid for `slide` ticks. Angles are between the
+// force and the normal of the touched surface.
 Ramp drag(Touch& touch, const dvec3& above, const std::function<dvec3(int)>& device, int ticks, int slide) {
   Ramp ramp;
   touch.go(above, 1e-3);
@@ -59,7 +59,7 @@ void expect_coulomb(const char* name, const Ramp& ramp, double step_share) {
   EXPECT_EQ(ramp.crept_m, 0.0) << "stuck is stuck";
 }
 
-constexpr double kFine = 5e-6;  // device step per tick: 0.3 % of the travel that the cone allows
+constexpr double kFine = 5e-6;  // device step per tick (m): 0.3 % of the travel that the cone allows
 
 TEST_F(Feel, APlaneHoldsToTheStaticConeAndLetsSlideAtTheDynamicOne) {
   Touch touch(scene_of({rough(plane())}, kRadius), {0, 0, 0.02});
@@ -73,7 +73,7 @@ TEST_F(Feel, ABoxOfTrianglesDoesToo) {
   expect_coulomb("box mesh", drag(touch, {-0.01, 0.003, 0.01}, device, 5000, 3000), 0.01);
 }
 
-// Along a great circle at a constant depth below the ball, over faces, edges and corners.
+// The device moves along a great circle at a constant depth, over faces, edges and corners of the ball.
 TEST_F(Feel, AnIcosphereDoesToo) {
   Touch touch(scene_of({rough(ball())}, kRadius), {0, 0, 0.08});
   const dvec3 x = glm::normalize(dvec3(1, 0.3, 0.2)), z = glm::normalize(glm::cross(x, dvec3(0.1, 1, 0.4)));
@@ -84,7 +84,7 @@ TEST_F(Feel, AnIcosphereDoesToo) {
   expect_coulomb("icosphere of 1,280", drag(touch, 0.06 * x, device, 30000, 25000), 0.01);
 }
 
-// With the tool at a person's speed: in a tick the proxy turns around half an edge.
+// At the speed of a hand, the proxy moves around half an edge per tick.
 TEST_F(Feel, AnIcosphereDoesTooAtTenCentimetersASecond) {
   Touch touch(scene_of({rough(ball())}, kRadius), {0, 0, 0.08});
   const dvec3 x = glm::normalize(dvec3(1, 0.3, 0.2)), z = glm::normalize(glm::cross(x, dvec3(0.1, 1, 0.4)));
@@ -115,7 +115,7 @@ TEST_F(Feel, StickAndSlipOnAPlaneGivesTheHandNothing) {
 }
 
 TEST_F(Feel, StickAndSlipOverTheEdgesOfABoxGivesTheHandNothing) {
-  // The edge is at x = 30 mm; the box is 40 mm thick.
+  // The box's edge is at x = 30 mm, and the box is 40 mm thick.
   const std::vector<Way> ways{
       {"over the edge and back",
        [](double p) { return dvec3(0.03 + 5e-3 * wave(p), 2e-3 * cowave(p), kRadius - 3e-3); }},
@@ -149,7 +149,7 @@ TEST_F(Feel, StickAndSlipOnAnIcosphereGivesTheHandNothing) {
 }
 
 TEST_F(Feel, AWedgeHoldsByBothItsFaces) {
-  // Two planes at 90 degrees: the tool is pressed into the groove and dragged along it.
+  // Two planes at 90 degrees form a groove. The tool is pressed into the groove and dragged along it.
   RigidDescription left = rough(plane()), right = rough(plane());
   left.name = "left";
   right.name = "right";

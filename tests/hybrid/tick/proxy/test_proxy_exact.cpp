@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The proxy on meshes that are hard for it, driven slowly, fast and by jumps. Exact kernels that share no
-// code with it check that it is never inside, never passes through, is never nearer than its radius, and is
-// at an optimum.
+// The proxy on meshes that are hard for it, moved slowly, fast and by jumps. Exact kernels that share no code
+// with the proxy check four things. It is never inside, never passes through, is never nearer than its
+// radius, and is at an optimum.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,8 +22,8 @@ using tests::HostileMesh;
 
 enum class Gait { stroke, dash, jump };
 
-// The device's path: under the surface along its vertices at up to 0.2 mm per tick, across it at 1 mm per
-// tick, or by jumps between random places.
+// The device's path. It leads under the surface along its vertices at up to 0.2 mm per tick, across the
+// surface at 1 mm per tick, or jumps between random places.
 class Walk {
  public:
   Walk(const polygon::TriangleMesh& mesh, Gait gait, std::uint64_t seed)
@@ -58,7 +58,7 @@ class Walk {
         const dvec3 goal = v * between(0.8, 0.99) + 2e-3 * anywhere();
         const double far = glm::length(goal - at_);
         to_ = far > 0.02 ? at_ + (goal - at_) * (0.02 / far) : goal;
-        if (glm::length(at_) > 0.075) {  // outside: to the surface at once
+        if (glm::length(at_) > 0.075) {  // outside, so it jumps back to the surface
           to_ = 1.1 * v;
           step_ = 2e-2;
         }
@@ -88,10 +88,10 @@ class Hostile : public ::testing::TestWithParam<std::size_t> {};
 
 TEST_P(Hostile, NeverInsideNeverThroughAndAtAnOptimum) {
   const HostileMesh hard = tests::hostile_meshes(1)[GetParam()];
-  const char* longer = std::getenv("HYBRID_TRUTH_TICKS");  // a longer walk, started by hand
+  const char* longer = std::getenv("HYBRID_TRUTH_TICKS");  // sets a longer walk, for runs by hand
   const int ticks = longer != nullptr ? std::stoi(longer) : 120;
   double worst = 0.0, clearance = 1.0, way_clearance = 1.0;
-  int bounded = 0;  // ticks in which the bound on the steps was reached
+  int bounded = 0;  // number of ticks in which the proxy reached its bound on steps
   for (const double radius : {0.0, 2e-3}) {
     for (const Gait gait : {Gait::stroke, Gait::dash, Gait::jump}) {
       SCOPED_TRACE(hard.name + ", radius " + std::to_string(radius) + ", gait " +

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The proxy on rigid objects alone: depth and direction against closed forms, first-order conditions against
-// every triangle of a mesh, and no penetration.
+// The proxy on rigid objects alone. Depth and direction are compared with closed forms, first-order
+// conditions are checked against every triangle of a mesh, and nothing may be penetrated.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using tests::Touch;
 
 constexpr double kStiffness = 1000.0;
 
-// Rigid objects only, made in code; SI.
+// A scene of rigid objects only, in SI units.
 Scene scene_of(std::vector<hybrid::RigidDescription> rigid, double tool_radius) {
   Scene scene;
   scene.file = "in the test";
@@ -56,7 +56,7 @@ dvec3 random_direction(std::mt19937_64& random) {
 
 class RigidSweep : public tests::SceneFile {
  protected:
-  // Meshes go through a file, as in a user's scene.
+  // A mesh that is written to a file and read again, as in a user's scene.
   hybrid::RigidDescription mesh(const std::string& name, const polygon::TriangleMesh& m) const {
     polygon::save_ply(folder_ / (name + ".ply"), m);
     return object(name, hybrid::MeshSource{.file = folder_ / (name + ".ply")});
@@ -79,14 +79,15 @@ TEST_F(RigidSweep, ABallPressesBackWithTheCouplingTimesTheDepth) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// Every vertex is on the sphere; a facet's centre is deeper by at most edge²/(6R), which is the facets'
-// allowance.
+// Every vertex is on the sphere. The centre of a facet is deeper by at most edge²/(6R). So the facets may
+// differ by this much from the exact depth.
 TEST_F(RigidSweep, ABallOfFacetsDoesSoWithinOnePercent) {
   const double radius = 0.02;
   const auto icosphere = polygon::make_ball_mesh(radius, 6);
   const auto& t = icosphere.triangles.front();
   const double edge = glm::length(icosphere.vertices[t[0]] - icosphere.vertices[t[1]]);
-  ASSERT_LT(1.5 * edge * edge / (6.0 * radius), 0.01 * 1e-3);  // below one percent of the smallest depth
+  ASSERT_LT(1.5 * edge * edge / (6.0 * radius),
+            0.01 * 1e-3);  // 1.5 times this is below one percent of the smallest depth
   Touch touch(scene_of({mesh("ball", icosphere)}, 5e-3), {0, 0, 0.1});
   for (int n = 0; n < 20; ++n) {
     const dvec3 out = random_direction(random);
@@ -94,7 +95,7 @@ TEST_F(RigidSweep, ABallOfFacetsDoesSoWithinOnePercent) {
     for (const double depth : {1e-3, 3e-3, 5e-3}) {
       const TickResult felt = touch.go((0.025 - depth) * out, 1e-3, 2);
       EXPECT_NEAR(glm::length(felt.force_N), kStiffness * depth, 0.01 * kStiffness * depth);
-      // The slope of a facet, besides the depth: a finger joint can tell 2.5 degrees.
+      // The slope of a facet turns the force. A finger joint can resolve 2.5 degrees.
       EXPECT_GT(glm::dot(glm::normalize(felt.force_N), out), std::cos(glm::radians(2.5)));
     }
     touch.go(0.1 * out, 2e-3);
@@ -110,7 +111,7 @@ TEST_P(BoxContact, FaceEdgeAndCorner) {
   const auto box = GetParam() ? mesh("box", polygon::make_box_mesh(half, 8))
                               : object("box", hybrid::BoxPrimitive{2.0 * half});
   struct Case {
-    dvec3 at, out;  // on the surface, and outward
+    dvec3 at, out;  // a point of the surface, and an outward direction
   };
   const std::array<Case, 6> cases{{{{0.0, 0.0, half.z}, {0, 0, 1}},
                                    {{half.x, 0.0011, 0.0023}, {1, 0, 0}},
@@ -125,7 +126,7 @@ TEST_P(BoxContact, FaceEdgeAndCorner) {
     touch.go(c.at + 0.05 * c.out, 2e-3);
     for (const double depth :
          {1e-3, 3e-3,
-          5e-3}) {  // less than r: the tool's centre stays outside, so the outward direction is c.out
+          5e-3}) {  // less than r, so the tool's centre stays outside and the force is along c.out
       const TickResult felt = touch.go(c.at + (r - depth) * c.out, 1e-3, 2);
       EXPECT_LE(glm::length(felt.force_N - kStiffness * depth * c.out), 1e-5 * kStiffness * depth)
           << c.at.x << ' ' << c.at.y << ' ' << c.at.z;
@@ -156,7 +157,7 @@ TEST_P(Sheet, StrokesAtTwoMetersASecondNeverGetThrough) {
              [&](const TickResult& felt) { ASSERT_GE(side * felt.proxy_m.z, 2e-3 * (1.0 - 1e-9)) << n; });
     const TickResult pressed = touch.at(to);
     EXPECT_NEAR(pressed.force_N.z, side * kStiffness * 0.052, 1e-6);
-    // Back up on the same side, and round the edge to the other side for the next stroke.
+    // The tool moves back on the same side, and around the edge to the other side for the next stroke.
     touch.go({place(random), place(random), 0.05 * side}, 2e-3, 1,
              [&](const TickResult& felt) { ASSERT_GT(side * felt.proxy_m.z, 0.0); });
     touch.go({0.6, 0.0, 0.05 * side}, 2e-3);
@@ -178,7 +179,8 @@ TEST_P(Sheet, AJumpOfAMeterInATickDoesNotEither) {
       const TickResult felt = touch.at(to);
       ASSERT_GE(side * felt.proxy_m.z, 2e-3 * (1.0 - 1e-9)) << n;
       for (int wait = 0; wait < 3; ++wait) touch.at(to);
-      // Under the sheet the proxy is straight above the device, wherever the device jumped to.
+      // With the device behind the sheet, the proxy is straight in front of it on the sheet, wherever the
+      // device jumped to.
       const dvec3 on_sheet(to.x, to.y, n % 2 == 0 ? 2e-3 * side : z);
       EXPECT_LE(glm::length(touch.state().proxy_m - on_sheet), 1e-6) << n;
     }
@@ -187,7 +189,7 @@ TEST_P(Sheet, AJumpOfAMeterInATickDoesNotEither) {
 }
 INSTANTIATE_TEST_SUITE_P(ExactAndOfTriangles, Sheet, ::testing::Bool());
 
-// Three sheets that cross in one point, and the corner between them.
+// A scene of three sheets that cross in one point and form a concave corner.
 Scene corner_scene(double scale, const dvec3& offset) {
   const double size = 0.2 * scale;
   Scene scene = scene_of({object("floor", hybrid::PlanePrimitive{size}, offset),
@@ -203,7 +205,7 @@ TEST_F(RigidSweep, AConcaveCornerHoldsTheToolOnAllThreeSides) {
   EXPECT_LE(glm::length(felt.proxy_m - dvec3(2e-3)), 1e-9);
   EXPECT_LE(glm::length(felt.force_N - dvec3(5.0, 3.0, 7.0)), 1e-6);
   EXPECT_EQ(felt.contacts, 7U);
-  // Along two of the sheets into the third, at speed.
+  // The tool moves fast along two of the sheets into the third.
   touch.go({0.05, -4e-3, -4e-3}, 2e-3);
   const TickResult again = touch.go({-6e-3, -4e-3, -4e-3}, 2e-3, 2);
   EXPECT_LE(glm::length(again.proxy_m - dvec3(2e-3)), 1e-9);
@@ -218,18 +220,19 @@ TEST_F(RigidSweep, ManyWalksInTheCornerNeverLeaveIt) {
     touch.go(to, step, 2, [&](const TickResult& felt) {
       for (int d = 0; d < 3; ++d) ASSERT_GE(felt.proxy_m[d], 2e-3 * (1.0 - 1e-9)) << n;
     });
-    // The corner is convex from inside: the constrained minimum is the device clamped to the corner.
+    // The free space of the corner is convex, so the constrained minimum is the device's position clamped to
+    // it.
     ASSERT_LE(glm::length(touch.state().proxy_m - glm::max(to, dvec3(2e-3))), 1e-6) << n;
   }
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// The same motion in scenes of another size and place must give proportional results.
+// The same motion in scenes of other sizes and places must give proportional results.
 TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
   struct Where {
     double scale;
     dvec3 offset;
-    double rounding;  // of a coordinate there, relative to the scale; a hundred of them may add up
+    double rounding;  // rounding of a coordinate, relative to the scale; a hundred of them may add up
   };
   const std::array<Where, 5> places{{{1e-3, dvec3(0.0), 1e-12},
                                      {1.0, dvec3(0.0), 1e-12},
@@ -254,7 +257,7 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
     }
     EXPECT_EQ(touch.state().faults, 0U) << "scale " << w.scale << ", offset " << w.offset.x;
   }
-  // Also a curved mesh, which has planes in all directions.
+  // The same for a curved mesh, which has planes in all directions.
   std::optional<std::vector<dvec3>> first;
   for (const Where& w : places) {
     auto ball = mesh("ball", polygon::make_ball_mesh(0.02 * w.scale, 4));
@@ -271,17 +274,18 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
     double worst = 0.0;
     for (std::size_t n = 0; n < proxies.size(); ++n)
       worst = std::max(worst, glm::length(proxies[n] - (*first)[n]));
-    // A minimum in a shallow valley of facets moves by the square root of the planes' motion.
+    // If planes move by rounding, a minimum in a shallow valley of facets moves by the square root of that.
     EXPECT_LE(worst, 1e-7 + std::sqrt(2.0 * 5e-3 * 100.0 * w.rounding))
         << "scale " << w.scale << ", offset " << w.offset.x;
   }
 }
 
-// Least |pull − Σ λ n| with λ >= 0 over all sets of at most three normals.
+// The least |pull − Σ λ n| with λ >= 0, over all sets of at most three normals.
 double unbalanced(const dvec3& pull, const std::vector<dvec3>& normals) {
   double best = glm::length(pull);
   const auto look = [&](const std::vector<std::size_t>& s) {
-    // Least squares by the normal equations; a smaller set covers a dependent one.
+    // Least squares by the normal equations. Sets of dependent normals are skipped, because a smaller set
+    // covers them.
     glm::dmat3 gram(1.0);
     dvec3 right(0.0);
     for (std::size_t i = 0; i < s.size(); ++i) {
@@ -308,15 +312,15 @@ double unbalanced(const dvec3& pull, const std::vector<dvec3>& normals) {
   return best;
 }
 
-// At a minimum the contact forces of triangles at distance r balance the device's pull, and no triangle is
+// At a minimum, contact forces of triangles at the distance r balance the device's pull, and no triangle is
 // nearer than r.
 TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
   const double r = 5e-3;
-  const auto icosphere = polygon::make_ball_mesh(0.02, 3);  // 1,280 triangles: edges of 3 mm
+  const auto icosphere = polygon::make_ball_mesh(0.02, 3);  // 1,280 triangles with edges of 3 mm
   Touch touch(scene_of({mesh("ball", icosphere)}, r), {0, 0, 0.05});
   double worst = 0.0, nearest = 1.0;
   for (int n = 0; n < 3000; ++n) {
-    const double angle = 1e-3 * n;  // 23 mm/s, 2 mm deep; over faces, edges and corners
+    const double angle = 1e-3 * n;  // 23 mm/s at a depth of 2 mm, over faces, edges and corners
     const dvec3 out(std::sin(angle) * std::cos(0.7 * angle), std::sin(angle) * std::sin(0.7 * angle),
                     std::cos(angle));
     const TickResult felt = touch.at(0.023 * out);
@@ -335,7 +339,7 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
     worst = std::max(worst, unbalanced(felt.proxy_m - felt.device_m, normals));
   }
   EXPECT_LE(worst, 1e-6);         // the proxy is within a micrometer of its minimum
-  EXPECT_GE(nearest, r - 1e-11);  // and never nearer to any triangle
+  EXPECT_GE(nearest, r - 1e-11);  // and never nearer to a triangle than r
   EXPECT_EQ(touch.state().truncated_ticks, 0U);
   RecordProperty("worst_m", std::to_string(worst));
   std::printf(
@@ -343,8 +347,8 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
       worst, r - nearest);
 }
 
-// On a convex surface the proxy must be at the nearest place, whichever path it took; motion back and forth
-// over the edges must not trap it.
+// On a convex surface, the proxy must be at the nearest place, whatever its path. Motion back and forth over
+// edges must not trap it.
 TEST_F(RigidSweep, OnAFinelyFacetedBallTheProxyIsAtTheNearestFace) {
   for (const double r : {0.0, 5e-3}) {
     const auto icosphere = polygon::make_ball_mesh(0.02, 3);
@@ -368,16 +372,16 @@ TEST_F(RigidSweep, OnAFinelyFacetedBallTheProxyIsAtTheNearestFace) {
       elsewhere += depth > least * (1.0 + 1e-9) ? 1 : 0;
       worst = std::max(worst, depth / least - 1.0);
     }
-    // Neighbouring facets differ by up to 11 degrees, or 1.8 % of the depth; a twentieth of that is
-    // hysteresis. The nearest face may be up to three edges away, round a corner. The first edge counts for
-    // at least a quarter of the whole.
+    // Normals of neighbouring facets differ by up to 11 degrees, which is 1.8 % of the depth. A twentieth of
+    // that is allowed as hysteresis. The nearest face may be up to three edges away, around a corner. The
+    // first edge counts for at least a quarter of the whole, hence the factor 4.
     EXPECT_LE(worst, 4.0 * 0.05 * 0.018) << r;
     EXPECT_LE(elsewhere, ticks / 10) << r;
     EXPECT_EQ(touch.state().truncated_ticks, 0U);
   }
 }
 
-// The tool does not cross a cube's edge: pressed on the top, it stays on top however near the side is.
+// A tool that is pressed on the top of a cube does not cross the edge, however near the side face is.
 TEST_F(RigidSweep, ASharpEdgeIsNotCrossed) {
   Touch touch(scene_of({mesh("cube", polygon::make_box_mesh(dvec3(0.02), 4))}, 2e-3), {0, 0, 0.05});
   touch.go({0.015, 0, 0.021}, 1e-3);
@@ -389,7 +393,8 @@ TEST_F(RigidSweep, ASharpEdgeIsNotCrossed) {
 }
 
 TEST_F(RigidSweep, AFlatMeshIsFlatWhereverTheToolCrossesItsEdges) {
-  // Coordinates rounded to floats, as a file may have them: planes that differ by millionths of a radian.
+  // Coordinates are rounded to floats, as in some files. So the facets' planes differ by millionths of a
+  // radian.
   auto sheet = polygon::make_plane_mesh(0.05, 25);
   for (dvec3& v : sheet.vertices) v = dvec3(glm::vec3(v + dvec3(0.3, -0.2, 0.1)));
   Touch touch(scene_of({mesh("sheet", sheet)}, 5e-3), {0.3, -0.2, 0.15});

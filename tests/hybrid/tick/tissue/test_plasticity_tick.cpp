@@ -28,9 +28,9 @@ class YieldTick : public tests::SceneFile {
 };
 
 constexpr dvec3 kAbove(0.0, 0.0, 0.02);
-constexpr double kTouchedAt = 6e-3;  // the block's top is at z = 0
+constexpr double kTouchedAt = 6e-3;  // height of the tool's centre when it touches the block
 
-// Presses to a depth, holds, leaves and waits.
+// Presses the tool to a depth, holds it there, takes it away and waits. Returns the force while held (N).
 double press_and_leave(Touch& touch, double depth_m) {
   const double force = coupling(touch.go({0, 0, kTouchedAt - depth_m}, 4e-5, 1000)).z;
   touch.go(kAbove, 1e-4, 2000);
@@ -55,11 +55,12 @@ TEST_F(YieldTick, ABlockKeepsItsDentAndTheToolFeelsIt) {
   EXPECT_GT(dent, 0.2 * depth);
   EXPECT_LT(dent, depth);
   EXPECT_LT(deepest_m(spring), 0.01 * depth) << "what does not yield has none";
-  // At the former surface there is no tissue any more.
+  // The tissue of the dent is gone: a tool in the upper half of the dent touches nothing.
   const dvec3 in_the_dent(0.0, 0.0, kTouchedAt - 0.5 * dent);
   EXPECT_EQ(coupling(dough.go(in_the_dent, 4e-5, 100)), dvec3(0.0));
   EXPECT_GT(coupling(spring.go(in_the_dent, 4e-5, 100)).z, 0.0);
-  // Deep in the dent there is tissue, and a load below the first one leaves the dent unchanged.
+  // Below the dent the tool does touch tissue. A press less deep than the first one leaves the dent
+  // unchanged.
   EXPECT_GT(press_and_leave(dough, 0.5 * (dent + depth)), 0.0);
   EXPECT_NEAR(deepest_m(dough), dent, 0.02 * dent);
 }

@@ -14,8 +14,8 @@
 namespace {
 
 struct Course {
-  std::vector<double> force_N;  // [tick] of the coupling
-  std::vector<double> gap_m;    // [tick / kEvery] between brain and skull
+  std::vector<double> force_N;  // [tick] coupling force
+  std::vector<double> gap_m;    // [tick / kEvery] between brain and skull, negative if they overlap
   double cell_m = 0.0;
 };
 constexpr std::size_t kEvery = 5;
@@ -45,8 +45,8 @@ TEST(RestingTissue, ABrainStaysOutsideItsSkullAndComesToRest) {
   std::cout << "overlap with the skull at most " << -100.0 * deepest / cell << " % of a cell\n";
   EXPECT_GT(deepest, -0.05 * cell);
 
-  // The tool is gone from 3.4 s on. The brain rises off the skull and must not come back, that is, not
-  // oscillate.
+  // The tool is away from 3.4 s on. The brain then rises off the skull, and must not oscillate: its gap to
+  // the skull may only grow.
   double falls = 0.0, highest = *gap_from(3.6);
   for (auto gap = gap_from(3.6); gap != course.gap_m.end(); ++gap) {
     highest = std::max(highest, *gap);
@@ -55,12 +55,12 @@ TEST(RestingTissue, ABrainStaysOutsideItsSkullAndComesToRest) {
   EXPECT_LT(falls, 0.01 * cell);
   EXPECT_NEAR(course.gap_m.back(), course.gap_m.front(), 0.02 * cell);
 
-  // At rest at the depth of the first press: steps of the force from tick to tick.
+  // While the tool is held at the depth of its first press, the force hardly changes from tick to tick.
   double step = 0.0;
   for (std::size_t n = 900; n < 1040; ++n)
     step = std::max(step, std::fabs(course.force_N[n] - course.force_N[n - 1]));
-  // Soon after the tool stopped: each asynchronous result is applied in parts, none of which is noticeable by
-  // itself (7 % of the force).
+  // This also holds soon after the tool stopped, when asynchronous results still arrive. Each is applied in
+  // parts, and no part changes the force noticeably (by more than 7 %).
   double result = 0.0;
   for (std::size_t n = 700; n < 1040; ++n)
     result = std::max(result, std::fabs(course.force_N[n] - course.force_N[n - 1]));

@@ -28,10 +28,10 @@ std::string gel(double radius_mm, double thickness_mm, const Limits& limits) {
 
 class TissueFacets : public tests::SceneFile {};
 
-// By brute force: the surface of a block at rest is its box, grown by half a spacing.
+// The surface of a block at rest is known: it is the box of its voxel centres, grown by half a spacing.
 TEST_F(TissueFacets, OfABlockAtRestAreItsFaces) {
   tests::Touch touch(load(gel(2.0, 20.0, {0.5, 1.5, 0.5})), {0.0, 0.0, 0.013});
-  touch.at({0.0, 0.0, 0.01205});  // lists the voxels nearby, and touches none
+  touch.at({0.0, 0.0, 0.01205});  // near enough to list voxels, without touching any
   const voxel::SoftObject& block = *touch.state().soft[0];
   const auto& dims = block.lattice().grid().dims;
   const double top = block.lattice().rest(block.lattice().at(0, 0, dims[2] - 1)).z;
@@ -51,7 +51,7 @@ TEST_F(TissueFacets, OfABlockAtRestAreItsFaces) {
   }
   tool.centre = {x, y, top + 0.5 * kSpacing_m + 1.6e-3};  // too far
   EXPECT_EQ(hybrid::facet_bounds(block, tool, 1.5e-3, bounds), 0U);
-  // Beside the edge of the top the tool may go down along the side.
+  // Just outside an edge of the top, the facets are those of the side, so the tool can slide down along it.
   tests::Touch beside(load(gel(2.0, 20.0, {0.5, 1.5, 0.5})), {0.0235, 0.0, 0.0095});
   beside.at({0.02205, 0.0, 0.0095});
   const double side = block.lattice().rest(block.lattice().at(dims[0] - 1, 0, 0)).x;
@@ -61,8 +61,8 @@ TEST_F(TissueFacets, OfABlockAtRestAreItsFaces) {
   for (std::size_t i = 0; i < count; ++i) EXPECT_NEAR(bounds[i].normal.x, 1.0, 1e-12);
 }
 
-// Pressed to beyond the limits of the links: the force is held as long as the tool is, and the tool comes out
-// on the side where it went in.
+// Presses a tool until links exceed their limits. There must be a force as long as the tool is held, and the
+// tool must come out on the side where it went in.
 TEST_F(TissueFacets, NoSmallToolIsLost) {
   for (const Limits& limits : {Limits{0.5, 1.5, 0.5}, Limits{0.5, 2.0, 1.0}}) {
     for (const double radius_mm : {0.2, 1.0, 2.0}) {
@@ -72,7 +72,7 @@ TEST_F(TissueFacets, NoSmallToolIsLost) {
                                           << limits.longest << ", at " << at.x << ", " << at.y);
           const double top = 0.5e-3 * thickness_mm;
           tests::Touch touch(load(gel(radius_mm, thickness_mm, limits)), {at.x, at.y, top + 6e-3});
-          // 0.9 of the thickness from the surface.
+          // The tool goes down through 0.9 of the thickness.
           double least_N = 1e9;
           touch.go({at.x, at.y, top - 0.9e-3 * thickness_mm}, 4e-5);
           touch.go(touch.state().device_m, 4e-5, 600, [&](const hybrid::TickResult& tick) {
@@ -90,7 +90,8 @@ TEST_F(TissueFacets, NoSmallToolIsLost) {
   }
 }
 
-// Links that may be three times as long let the tool through. This is said.
+// Links that may stretch to three times their length can let the tool through. If they do, the fault bit is
+// set.
 TEST_F(TissueFacets, AToolThatGotThroughIsAFault) {
   tests::Touch touch(load(gel(1.0, 20.0, {0.2, 3.0, 2.0})), {0.0, 0.0, 0.016});
   const hybrid::TickResult held = touch.go({0.0, 0.0, -0.004}, 4e-5, 600);
