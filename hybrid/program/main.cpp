@@ -234,8 +234,7 @@ void add_tune(CLI::App& app, int& status) {
       sub->add_flag("--apply", c->apply, "write the choice into the scene's file; the rest of it stays");
   sub->add_option("--out", c->out, "write the choice into a new scene file, in the folder of the scene")
       ->excludes(apply);
-  sub->add_option("--cache", c->cache,
-                  "folder that keeps finished parts; the same command then goes on there");
+  sub->add_option("--cache", c->cache, "folder that keeps finished parts; a repeated command goes on there");
   sub->add_option("--plot", c->plot, "write error over cost of all settings as SVG");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::tune_scene(*c); });
@@ -246,7 +245,7 @@ CLI::Validator one_of(const std::vector<std::string>& known) {
           CLI::detail::generate_set(known)};
 }
 
-// Refuses options that have no effect in the suite, and names the suites in which they have.
+// Refuses options that have no effect in the suite, and names the suites in which they have one.
 void refuse_unused(const CLI::App& bench, const std::string& suite) {
   for (const hybrid::BenchOption& option : hybrid::bench_options()) {
     const auto& suites = option.suites;
