@@ -207,6 +207,8 @@ LabelNames from_json(const std::filesystem::path& file, const std::string& text)
   } catch (const NameJson::parse_error& error) {
     throw ComposeError(fmt::format("{}:{}: is no JSON; {}", file.string(),
                                    line_at(text, error.byte > 0 ? error.byte - 1 : 0), remedy));
+  } catch (const NameJson::exception&) {  // a number beyond all that can be stored, without its place
+    throw ComposeError(fmt::format("{}: holds a number that is too large; {}", file.string(), remedy));
   }
   const NameJson* table = &json;
   for (const char* key : {"labels", "LabelMap"}) {  // LabelMap: BIDS

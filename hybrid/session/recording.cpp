@@ -13,6 +13,7 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/whole_file.h"
+#include "hybrid/scene/toml_tree.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/work_budget.h"
 
@@ -49,6 +50,8 @@ bool are_edits(std::uint64_t bytes, bool with_edits) {
 bool is_edit(const Edit& edit) {
   return static_cast<std::uint32_t>(edit.quantity) < kEditedQuantities && std::isfinite(edit.value);
 }
+
+constexpr std::size_t kLongestPath = 4096;  // in messages, as of the system (PATH_MAX)
 
 // Of a servo loop (unit: second): 1 MHz to 1 Hz, far beyond the rates that scenes and drivers have.
 constexpr double kLeastPeriod_s = 1e-6, kMostPeriod_s = 1.0;
@@ -132,6 +135,8 @@ Recording load_recording(const std::filesystem::path& file) {
   recording.scene_text.resize(header.text_bytes);
   in.read(path.data(), static_cast<std::streamsize>(path.size()));
   in.read(recording.scene_text.data(), static_cast<std::streamsize>(header.text_bytes));
+  if (path.find('\0') != std::string::npos)
+    throw std::runtime_error(fmt::format("{}: damaged name of its scene; copy it again", file.string()));
   recording.scene_file = path;
   recording.dt_s = header.dt_s;
   recording.device.max_force_N = header.max_force_N;
@@ -168,7 +173,7 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
     throw std::runtime_error(
         fmt::format("{}: the scene is not what was recorded (changed or moved); put the recorded text back, "
                     "or record again",
-                    recording.scene_file.string()));
+                    printable(recording.scene_file.string(), kLongestPath)));
   }
   Scene scene = load_scene(recording.scene_file);
   scene.opened_limits = recording.device;  // the device of the recording may not be connected now

@@ -100,7 +100,8 @@ std::optional<nlohmann::json> EvaluationCache::find(const std::string& text) con
   std::ifstream in(file_of(key));
   if (!in) return std::nullopt;
   const nlohmann::json kept = nlohmann::json::parse(in, nullptr, false);
-  if (!kept.is_object() || !kept.contains("record") || kept.value("key", "") != key) return std::nullopt;
+  if (!kept.is_object() || !kept.contains("record") || !kept.contains("key") || kept["key"] != key)
+    return std::nullopt;
   return kept.at("record");
 }
 

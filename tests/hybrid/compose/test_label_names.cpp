@@ -166,6 +166,7 @@ TEST(LabelNames, WhatCannotBeReadNamesTheFileAndWhatToDo) {
            {"twice.json", R"({"liver": 1, "spleen": 1})", "label 1 is called \"liver\" and \"spleen\"",
             "keep one"},
            {"broken.json", "{\"labels\":\n {\"liver\": 1,,}}", "broken.json:2: is no JSON", "nnU-Net"},
+           {"large.json", R"({"liver": 1e999})", "large.json: holds a number that is too large", "nnU-Net"},
            {"none.json", R"({"index": {"Description": "a number"}})", "none.json: names no label",
             "nnU-Net"}}) {
     const std::string text = NamesFile(c.file, c.bytes).refusal();

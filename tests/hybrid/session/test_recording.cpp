@@ -410,6 +410,10 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
     std::memcpy(wrong.data() + 32, &dt, sizeof dt);
     EXPECT_NE(refusal_of(wrong), "") << dt;
   }
+  // A name with a zero byte, which would end every message.
+  std::string cut_name = bytes;
+  cut_name[104] = '\0';
+  EXPECT_NE(refusal_of(cut_name).find("damaged name of its scene"), std::string::npos);
   // Values of a tick that no session writes: its fault and its share of work.
   const std::size_t last_tick = bytes.size() - 48;
   for (const std::size_t field : {std::size_t{32}, std::size_t{33}, std::size_t{36}, std::size_t{37}}) {

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "device/loop/stop_signal.h"
@@ -137,6 +138,8 @@ TEST_F(Tune, AnotherSceneAnotherFileAndADamagedRecordAreNotFound) {
   const auto record = std::filesystem::directory_iterator(cache)->path();
   std::filesystem::resize_file(record, std::filesystem::file_size(record) / 2);
   EXPECT_FALSE(found());
+  std::ofstream(record) << R"({"key": 5, "record": {"value": 0.1}})";
+  EXPECT_FALSE(found()) << "a key that is no text";
 }
 
 // A result with a single setting, whose error of 0.4 JND is within the bound.
