@@ -9,13 +9,23 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxShrinks = 60;  // halvings of the margin of a crowded survey
-constexpr int kCrowded = 5;      // halvings after which the crowd must be the pole of a fan of triangles
-constexpr std::uint32_t kManySurveys = 12;  // of one sweep: then surveys take more elements
-constexpr double kCentreAhead = 0.6;        // of its margin: how far ahead of the proxy a survey is centred
+constexpr int kMaxShrinks = 20;       // of the margin of a crowded survey
+constexpr int kCrowded = 4;           // shrinks after which the crowd must be the pole of a fan of triangles
+constexpr double kShrink = 0.125;     // of the margin of a crowded survey
+constexpr double kCentreAhead = 0.6;  // of its margin: how far ahead of the proxy a survey is centred
+// How far from the surface a ball's survey is centred, in margins, but no further than the ball's radius. The
+// neighbourhood is then a larger ball that reaches as far along the surface and holds much less of the
+// surface.
+constexpr double kLift = 4.0;
 // Target number of elements in a survey. Fewer are soon left behind, more take long to read. A ball has more
 // elements in contact range than a point has.
 constexpr double kGoodCount = 16.0, kGoodUnderBall = 104.0;
+// The margin doubles for a longer way only below this count (unit: elements): the next count is at most four
+// times as large, and fits Neighbourhood::kCapacity.
+constexpr double kMostBeforeGrowth = 0.125 * polygon::Neighbourhood::kCapacity;
+// Work of a survey beyond its elements, of a renewed plane, and planes read in a row that cost as much as one
+// element.
+constexpr std::uint32_t kWorkOfSurvey = 32, kWorkOfPlane = 2, kPlanesOfWork = 64;
 // Of the last count: if about half of the margin still finds this many, the proxy is at a pole.
 constexpr double kPoleCount = 0.7;
 constexpr double kPoleMargin = 0.6;
@@ -72,8 +82,8 @@ bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool mov
   RigidState& near = state_.rigid[o];
   const polygon::RigidSurface& surface = *world_.rigid[o].surface;
   const double smallest = 1e-6 * radius_ + 1e2 * rounding_;
-  if (surveys_ > 1) near.margin_m *= 2.0;  // too short a margin for this motion
   const double longest = glm::length(surface.upper() - surface.lower()) + radius_;
+  if (surveys_ > 1 && near.counted < kMostBeforeGrowth) near.margin_m *= 2.0;  // too short for this motion
   near.margin_m = std::clamp(near.margin_m, std::min(4.0 * smallest, longest), longest);
   // Far from the object, the whole empty distance is the margin.
   const glm::dvec3 outside =
@@ -81,25 +91,49 @@ bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool mov
   const double apart = (glm::length(outside) - radius_) * (1.0 - 1e-9) - 4.0 * rounding_;
   if (apart > 2.0 * near.margin_m) {
     ++surveys_;
+    work_ += kWorkOfSurvey;
     return near.near.survey(surface, view, apart, radius_, view);
   }
   const double margin = near.margin_m;
   for (int n = 0; n < kMaxShrinks; ++n) {
     if (n == kCrowded) near.margin_m = margin;
     if (n >= kCrowded && near.margin_m < smallest) break;
-    const glm::dvec3 ahead =
-        glm::transpose(near.frame.rotation) * direction_ * (kCentreAhead * near.margin_m);
+    const Reach reach = reach_of(near, view, moving);
+    const bool complete = near.near.survey(surface, reach.centre, reach.margin, radius_, view, n >= kCrowded);
     ++surveys_;
-    if (near.near.survey(surface, moving ? view + ahead : view, near.margin_m, radius_, view,
-                         n >= kCrowded || surveys_ > kManySurveys)) {
+    work_ += kWorkOfSurvey + (complete ? near.near.size() : polygon::Neighbourhood::kCapacity);
+    if (complete) {
       adapt_margin(near);
       return true;
     }
-    near.margin_m *= 0.5;
+    near.margin_m *= kShrink;
   }
   near.margin_m = radius_ + 1e3 * rounding_;
   state_.faults |= fault_triangle_overflow;
   return false;
+}
+
+// Where a survey is centred and how far it reaches, so that the proxy may move by the margin along the
+// surface, and further ahead. A ball of centres of radius s whose middle is t above the surface holds
+// elements within about sqrt(2 r (s - t)) of the contact: the higher, the fewer.
+ProxySurroundings::Reach ProxySurroundings::reach_of(const RigidState& near, const glm::dvec3& view,
+                                                     bool moving) const noexcept {
+  const double margin = near.margin_m;
+  glm::dvec3 ahead =
+      moving ? glm::transpose(near.frame.rotation) * direction_ * (kCentreAhead * margin) : glm::dvec3(0.0);
+  double clearance = margin;
+  glm::dvec3 up(0.0);
+  for (std::uint32_t i = 0; i < near.near.size(); ++i) {
+    const polygon::SeparatingPlane plane = near.near.plane(i);
+    const double room = glm::dot(plane.normal, view) - plane.offset;
+    if (!(room < clearance)) continue;
+    clearance = room;
+    up = plane.normal;
+  }
+  const double lift = std::min(kLift * margin, radius_);
+  if (up == glm::dvec3(0.0) || lift < margin) return {view + ahead, margin};
+  ahead -= glm::dot(ahead, up) * up;
+  return {view + ahead + lift * up, std::sqrt(margin * margin + lift * lift)};
 }
 
 // The margin of the next survey, so that it finds neither too few elements nor too many if it can.
@@ -175,36 +209,41 @@ void ProxySurroundings::first_in_object(std::uint32_t o, const glm::dvec3& q, do
   const glm::dvec3 view = near.frame.to_body(point_), goal = near.frame.to_body(q);
   const glm::dvec3 end = fraction == 1.0 ? goal : view + fraction * (goal - view);
   const double tolerance = 2.0 * rounding_;
-  std::span<Violation> violated = near.near.violated(view, end, tolerance);
-  while (!violated.empty()) {
-    std::size_t n = 0;
-    for (std::size_t i = 1; i < violated.size(); ++i) {
-      if (violated[i].fraction < violated[n].fraction ||
-          (violated[i].fraction == violated[n].fraction &&
-           near.near.element(violated[i].index) < near.near.element(violated[n].index)))
-        n = i;
-    }
-    if (violated[n].fraction >= soonest) return;
-    ProxyPlane candidate{o, near.near.element(violated[n].index), {}, true};
-    if (violated[n].fresh) {
-      soonest = violated[n].fraction;
-      first = candidate;
-      first.in_body = near.near.plane(violated[n].index);
-      return;
-    }
-    if (!is_covered(candidate, held))
-      candidate.in_body =
-          polygon::separating_plane(*world_.rigid[o].surface, candidate.element, view, radius_);
-    near.near.set_plane(violated[n].index, candidate.in_body);
+  constexpr double kWholeWay = 2.0;  // no part of the way is cut
+  const auto clear_part = [&](const polygon::SeparatingPlane& plane) {
+    const auto depth = [&plane](const glm::dvec3& at) { return plane.offset - glm::dot(plane.normal, at); };
     // A plane that only the first part of the way violates, by the rounding of the proxy's place, is being
     // left.
-    const double depth = candidate.in_body.offset - glm::dot(candidate.in_body.normal, end);
-    const double at_goal = candidate.in_body.offset - glm::dot(candidate.in_body.normal, goal);
-    if (depth > tolerance && at_goal > tolerance) {
-      violated[n].fresh = true;
-      violated[n].fraction = polygon::Neighbourhood::fraction_before(candidate.in_body, view, end);
+    if (!(depth(end) > tolerance && depth(goal) > tolerance)) return kWholeWay;
+    return polygon::Neighbourhood::fraction_before(plane, view, end);
+  };
+  std::span<Violation> violated = near.near.violated(view, end, tolerance);
+  work_ += 1 + near.near.size() / kPlanesOfWork;
+  const auto later = [&near](const Violation& a, const Violation& b) {
+    return a.fraction > b.fraction ||
+           (a.fraction == b.fraction && near.near.element(a.index) > near.near.element(b.index));
+  };
+  std::make_heap(violated.begin(), violated.end(), later);  // the soonest is first
+  while (!violated.empty() && violated.front().fraction < soonest) {
+    ProxyPlane candidate{o, near.near.element(violated.front().index), {}, true};
+    if (violated.front().fresh) {
+      soonest = violated.front().fraction;
+      first = candidate;
+      first.in_body = near.near.plane(violated.front().index);
+      return;
+    }
+    std::pop_heap(violated.begin(), violated.end(), later);
+    Violation& renewed = violated.back();
+    work_ += kWorkOfPlane;
+    const polygon::RigidSurface& surface = *world_.rigid[o].surface;
+    renewed.fresh = true;
+    if (!is_covered(candidate, held))
+      candidate.in_body = polygon::separating_plane(surface, candidate.element, view, radius_);
+    near.near.set_plane(renewed.index, candidate.in_body);
+    renewed.fraction = clear_part(candidate.in_body);
+    if (renewed.fraction < kWholeWay) {
+      std::push_heap(violated.begin(), violated.end(), later);
     } else {
-      violated[n] = violated.back();
       violated = violated.first(violated.size() - 1);
     }
   }

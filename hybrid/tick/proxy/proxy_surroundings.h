@@ -67,8 +67,15 @@ class ProxySurroundings {
     return (state_.look_mask & OccupancyMap::rigid_bit(o)) != 0;
   }
   [[nodiscard]] std::uint32_t surveys() const noexcept { return surveys_; }
+  // Elements listed and planes renewed so far, weighted by their cost (unit: elements listed).
+  [[nodiscard]] std::uint32_t work() const noexcept { return work_; }
 
  private:
+  struct Reach {
+    glm::dvec3 centre{0.0};  // body frame
+    double margin = 0.0;
+  };
+  [[nodiscard]] Reach reach_of(const RigidState& near, const glm::dvec3& view, bool moving) const noexcept;
   bool survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept;
   void adapt_margin(RigidState& near) const noexcept;
   void first_in_object(std::uint32_t o, const glm::dvec3& q, double part, std::span<const ProxyPlane> held,
@@ -84,7 +91,7 @@ class ProxySurroundings {
   std::uint32_t cutting_object_ = 0;  // 1 + the object whose neighbourhood cut the last way
   bool query_cut_way_ = false;        // the range of the map's query cut it
   double query_cells_ = kQueryCells;
-  std::uint32_t surveys_ = 0;
+  std::uint32_t surveys_ = 0, work_ = 0;
 };
 
 }  // namespace hybrid

@@ -55,7 +55,7 @@ class Sweeper {
     for (; sweep.steps < kMaxSteps; ++sweep.steps) {
       point_ = sweep.point;
       leave_trail(point_);
-      if (!around_.survey_from(point_)) break;
+      if (exhausted() || !around_.survey_from(point_)) break;
       if (sweep.steps == 0 &&
           goes_on) {  // on the triangle that held it last: crosses to the next one without a search
         const Crossing crossing = cross_edges(sweep.point, travel);
@@ -103,6 +103,7 @@ class Sweeper {
       if (travel <= 0.0) break;
     }
     sweep.surveys = around_.surveys();
+    sweep.work = around_.work();
     state_.swept_to_m = sweep.point;
     if (scope_.kind == Scope::Kind::all) publish(sweep);
     return sweep;
@@ -177,7 +178,7 @@ class Sweeper {
     const polygon::RigidSurface& surface = *world_.rigid[held.object].surface;
     const glm::dvec3 target = near.frame.to_body(target_);
     bool moved = false;
-    while (crossings_ < kMaxCrossings) {
+    while (crossings_ < kMaxCrossings && !exhausted()) {
       if (near.crossable_edges.element != held.element || near.crossable_edges.plane != held.in_body)
         near.crossable_edges =
             polygon::crossable_edges_of(surface, held.element, held.in_body, radius_, rounding_);
@@ -250,7 +251,7 @@ class Sweeper {
         if (first.object != ProxySurroundings::kNobody || part >= 1.0) break;
       }
       if (first.object == ProxySurroundings::kNobody) return true;
-      if (held_count_ == kMaxProxyPlanes || n + 1 == kMaxExchanges) {
+      if (held_count_ == kMaxProxyPlanes || n + 1 == kMaxExchanges || exhausted()) {
         end_way_before(first);
         return true;
       }
@@ -353,6 +354,7 @@ class Sweeper {
     state_.active_count = minimum_.active_count;
   }
 
+  [[nodiscard]] bool exhausted() const noexcept { return around_.work() >= kMostSweepWork; }
   [[nodiscard]] std::span<const ProxyPlane> held_planes() const noexcept {
     return {held_.data(), held_count_};
   }
