@@ -51,7 +51,7 @@ Moved lower_along_alike(float* row, float up, float down, float margin) noexcept
 // apex + n·slope − fall[i]. Row 0 is the row at the y of the cone's apex. The cone is written in half rows (a
 // cache line each). Each half ends before the first row in which its lane with the least fall is not raised
 // by more than the margin. In a state without violations, voxels further from the apex are raised less. So
-// the end is searched from a guess.
+// the search for the end can start at a guess.
 struct ConeColumn {
   float* own = nullptr;                     // row 0
   std::ptrdiff_t next = 0;                  // offset from a row to the one to prefetch (floats)

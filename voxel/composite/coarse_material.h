@@ -110,7 +110,7 @@ class CoarseMaterial {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr int kFirstLevel = 2;        // level of the smallest cubes with stored counts, in bytes
+  static constexpr int kFirstLevel = 2;        // level of the smallest cubes whose counts are stored
   static constexpr int kFirstAnchorLevel = 3;  // level of the smallest cubes with anchor marks
   struct CubeLevel {
     Index3 dims{};

@@ -74,8 +74,8 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
   for (Level& level : levels_) update_diagonal(level, a);
 }
 
-// Updates the multipliers of the links to anchors in the same way. Returns the largest limited / weight, >=
-// 1.
+// Updates the multipliers of the links to anchors, as update_row_weights() does for links between nodes.
+// Returns the largest limited / weight, >= 1.
 float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std::size_t d) noexcept {
   float most = 1.0F;
   if (!level.has_anchors) return most;
@@ -95,7 +95,7 @@ float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std:
   return most;
 }
 
-// Under the finer level a link gets the factor by which its two fine links, in series, have become stiffer.
+// Within the finer patch, multipliers stiffen a link by the same factor as its two fine links in series.
 void CompositeGrid::restrict_multipliers(std::size_t l, std::size_t a) noexcept {
   const Level& fine = levels_[l - 1];
   Level& coarse = levels_[l];
@@ -127,7 +127,7 @@ void CompositeGrid::restrict_multipliers(std::size_t l, std::size_t a) noexcept 
   }
 }
 
-// Diagonal and its inverse from the weights that now hold on axis `a`.
+// Finds the diagonal and its inverse from the weights that now apply on axis `a`.
 void CompositeGrid::update_diagonal(Level& level, std::size_t a) const noexcept {
   const auto& nodes = level.nodes;
   const auto& weight = weights_on(level, a);

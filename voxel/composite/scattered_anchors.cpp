@@ -89,7 +89,8 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
       if (weight > 0.0F) level.anchor_weight[d][n] = stiffness_at(level, n) * weight;
     }
   }
-  // A node behind a face has only anchored tissue if no other face holds the node.
+  // A node behind a face has only anchored tissue if no other face holds the node. Such a node gets the
+  // stiffest spring.
   const auto is_held = [&](std::size_t n) {
     return level.anchor_weight[0][n] + level.anchor_weight[1][n] + level.anchor_weight[2][n] > 0.0F;
   };
@@ -116,10 +117,10 @@ float CompositeGrid::constriction_of_face(const Level& level, std::size_t cell) 
   return std::sqrt(faces_of_cell_[cell] / (4.0F * std::numbers::pi_v<float> * part));
 }
 
-// Weight by which N of the s² faces of a cell hold a node. In series with the faces lie the tissue between,
-// and the constriction of the load that spreads from N faces to s². The constriction has the factor (1 −
-// ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² the weight is that of the chain of
-// links.
+// Weight by which N of the s² faces of a cell hold a node. In series with the faces lie the tissue between
+// them and the node, and the constriction of the load that spreads from N faces to s². The constriction has
+// the factor (1 − ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² the weight is that of
+// the chain of links.
 float CompositeGrid::weight_of_faces(const AnchorFaces& faces, std::size_t n, float square) noexcept {
   const float count = faces.count[n];
   if (count == 0.0F) return 0.0F;

@@ -39,7 +39,8 @@ class BoundarySprings {
   // `levels`: level 0 first; must outlive this. Allocates.
   BoundarySprings(const Lattice& lattice, const std::vector<LevelStiffness*>& levels);
 
-  // Voxels that the tool and other objects hold on all axes; at most as many as there are surface voxels.
+  // Sets the voxels that the tool and other objects hold on all axes; at most as many as there are surface
+  // voxels.
   void set_held(std::span<const VoxelId> held) noexcept;
   // Sets how voxel v is fixed by its obstacle, or by the tool that it slides on; takes effect with renew().
   void support(VoxelId v, const Support& by) noexcept;
@@ -89,7 +90,7 @@ class BoundarySprings {
     LevelStiffness* couplings = nullptr;
     std::array<std::array<LazyArray<float>, 3>, 3> through;  // [axis][d][cell]
     std::array<LazyArray<float>, 3> hold, nearer;            // [axis][cell]
-    LazyArray<std::uint8_t> row_held;                        // [row] number of non-zero ratios, and kWaits
+    LazyArray<std::uint8_t> row_held;                        // [row] values of `hold` that are not 0; kWaits
     std::array<LazyArray<float>, 3> tilt;                    // [xy, xz, yz][cell]
     LazyArray<std::uint8_t> row_tilted;  // [row] number of cells with an off-diagonal stiffness
     LazyArray<std::uint8_t> queued;      // [cell] 1: it is queued
@@ -113,7 +114,7 @@ class BoundarySprings {
     if ((!held_.empty() && held_mark_[v] != 0) || lattice_.anchored(v)) return kAll;
     return supports(v / kRow) ? supported_[v] : Support{};
   }
-  // ---- what anchors hold ----
+  // ---- springs of anchors ----
   void wait_for_anchors();
   void keep_records(int level);
   void find_waiting(int level, RowId row) noexcept;

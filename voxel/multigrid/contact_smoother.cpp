@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Passes of a cycle at contacts: pressed voxels slide on the tool, voxels at rigid surfaces stay outside of
-// them, and both are boundary springs for the coarse levels.
+// Passes of a cycle at contacts: pressed voxels slide on the tool, and voxels at rigid surfaces stay outside
+// these surfaces. Both give boundary springs to the cells above them.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -120,8 +120,8 @@ float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state
 }
 
 // Corrects a row of voxels as far as links and obstacles allow. The part that an obstacle refuses is not
-// subtracted from the cells. A refused voxel slides along the obstacle with its neighbours, and cells that
-// took its part back in every cycle would swing between two states.
+// subtracted from the cells, because the voxel slides along the obstacle with its neighbours. If cells lost
+// that part in every cycle, they would oscillate between two states.
 RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
                                         Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                         RowVector& refused) noexcept {
@@ -140,8 +140,8 @@ RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowV
   return done;
 }
 
-// Takes the force that presses a voxel against its obstacle or the tool out of the residual, because the
-// contact balances it. The cells above the voxel get a boundary spring.
+// A contact balances the force that presses a voxel against its obstacle or the tool. Subtracts this force
+// from the residual. The cells above the voxel get a boundary spring.
 void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                  RowResidual& found, RowVector& out) noexcept {
   const double touching = kTouching * lattice_.min_spacing_m();
