@@ -79,9 +79,9 @@ class CompositeGrid {
   // Begins a contact at voxel `centre`, with all displacements 0. Patches stay where they are if the voxel is
   // near the middle of level 0's patch.
   void begin(const Index3& centre) noexcept;
-  // Call it once a tick. It moves one patch after the contact. It moves more patches if the contact is too
-  // far from the middle of level 0, or if a finer patch would no longer be nested. True if the patch of level
-  // 0 moved.
+  // Call it once a tick. It moves one patch so that it follows the contact. It moves more patches if the
+  // contact is too far from the middle of level 0, or if a finer patch would no longer be nested. True if the
+  // patch of level 0 moved.
   bool centre_on(const Index3& centre) noexcept;
   // Box of the voxels of level 0's patch that may be moved; `low` and `high` are included.
   void fine_patch(Index3& low, Index3& high) const noexcept;

@@ -27,7 +27,8 @@ struct AxisNodes {
   int base = 0;
   bool odd = false;
   std::vector<float> lane_weight;
-  // By coarse node: the node at its place, at most one beyond either end; kOutside if it lies further out.
+  // By coarse node: index of the node at its place, which may be one beyond either end; kOutside: further
+  // out.
   std::vector<int> fine;
   int coarse_first = 0, coarse_last = -1;  // coarse nodes strictly within this patch
   // By coarse node: restriction weights of the nodes before, at and after it.

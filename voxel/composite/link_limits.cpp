@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Multipliers of links at their limits, where bounds of nodes do not suffice.
 //
-// In a body of one tissue bounds suffice (grid.h). With bounds alone, a soft tissue between stiffer ones
-// would be compressed beyond its limits. There each link at its limit carries a reaction beside its spring:
-// the multiplier of the limit. The multiplier is stored as additional stiffness. After each cycle links
-// beyond their limit become stiffer, and links within it softer again, but never softer than their spring.
-// The equilibrium is then the optimum within the limits: a reaction acts along its link, only at the limit,
-// and only against its violation. Cycles need no change, because a level knows its links by their weights
-// alone. The energy of the springs does not count multipliers.
+// In a body of one tissue bounds suffice (grid.h). But with bounds alone, a soft tissue between stiffer ones
+// would be compressed beyond its limits. So where tissues differ, each link at its limit also carries a
+// reaction: the multiplier of the limit. The multiplier is stored as additional stiffness. After each cycle,
+// links beyond their limit become stiffer. Links within their limit become softer again, but never softer
+// than their spring. The equilibrium is then the optimum within the limits: a reaction acts along its link,
+// only at the limit, and only against its violation. Cycles need no change, because a level knows its links
+// by their weights alone. The energy of the springs does not count multipliers.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"

@@ -79,8 +79,8 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Adds to links between voxels the excess of tissue too thin to fill a cell (LinkParts::thin). Coarse levels
-// know cells only: on them thin tissue moves with the tissue beside it.
+// Adds to the links between voxels the excess stiffness of tissue that is too thin to fill a cell
+// (LinkParts::thin). Coarse levels know cells only: on them thin tissue moves with the tissue beside it.
 void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& weight,
                                     bool all_alike) noexcept {
   const auto& nodes = level.nodes;
@@ -120,8 +120,8 @@ void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& w
   }
 }
 
-// Excess of thin tissue on the link along d from voxel v in the middle plane of voxel_planes_, relative to
-// the reference stiffness.
+// Excess stiffness of thin tissue on the link along d from voxel v in the middle plane of voxel_planes_,
+// relative to the reference stiffness.
 template <class Stiffness>
 float CompositeGrid::thin_excess(std::size_t v, std::size_t d, std::size_t wide,
                                  const Stiffness& stiffness) const noexcept {

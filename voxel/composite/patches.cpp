@@ -11,7 +11,7 @@ namespace {
 
 using composite::index;
 
-constexpr std::size_t kFewerGhosts = 16;  // an object that fills its box has so many times fewer ghosts
+constexpr std::size_t kFewerGhosts = 16;  // factor by which an object that fills its box has fewer ghosts
 // A side with more than this share of anchors gets a node at or beyond it.
 constexpr double kAnchoredSide = 0.25;
 constexpr float kMinWeight = 1e-3F;   // of a full link: a link of less weight is missing

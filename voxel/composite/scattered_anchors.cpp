@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Anchors on the coarse levels of a CompositeGrid, where they do not fill whole sides of the object. An
-// anchored region holds the nodes around it even if it is smaller than a coarse cell, or if no line of nodes
-// meets it.
+// Anchors that do not fill whole sides of the object, on the coarse levels of a CompositeGrid. An anchored
+// region holds the nodes around it even if it is smaller than a coarse cell, or if no line of nodes meets it.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -20,8 +19,8 @@ constexpr float kLeastResistance = 0.01F;
 
 // Finds the two nodes of an anchor's face. `held`: the node that the face holds; along d it lies in the plane
 // of the anchored voxel or next to it on the tissue's side. `nearest`: the nearest node along d. In the other
-// directions both lie on the line of links whose tissue includes the face's cell. If there is no link at
-// `held`, both are the nearest node with links. `distance`: from the anchored voxel to `held` along d
+// directions both nodes lie on the line of links whose tissue includes the face's cell. If there is no link
+// at `held`, both are the nearest node with links. `distance`: from the anchored voxel to `held` along d
 // (voxels). False if there is no such node.
 bool CompositeGrid::nodes_of_face(const Level& level, const CoarseMaterial::AnchorFace& face,
                                   std::size_t& held, std::size_t& nearest, int& distance) noexcept {

@@ -78,8 +78,8 @@ class BoundarySprings {
  private:
   using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links along d (N/m)
   // Springs of anchors are found when their row is first asked for, because all of them would take much
-  // memory. On coarse levels finding them takes long: there they are found on construction and stored without
-  // zeros.
+  // memory. On coarse levels finding them takes long: there they are found on construction and stored as
+  // records, without zeros.
   struct Record {
     VoxelId cell;
     std::uint32_t first;  // index of its first value in Level::values

@@ -75,9 +75,9 @@ float Multigrid::slide_pressed_by(RowId row, const RowVector& way, Displacement&
   return most;
 }
 
-// Moves a row. Voxels that this would take into their obstacles stay while the others move. If such a voxel
-// were put back afterwards, its neighbours would have followed it into the obstacle as far as links allow,
-// and would hold it there.
+// Moves a row. Voxels that would enter their obstacles stay where they are, while the others move. If such a
+// voxel were put back afterwards, its neighbours would have followed it into the obstacle as far as links
+// allow, and would hold it there.
 template <class Move>
 std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state,
                                       const ObstacleView& obstacles, const Move& move) noexcept {
@@ -174,8 +174,8 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
 }
 
 // Motion from another solver takes no voxel deeper into its obstacle than it was, except by rounding. If
-// rounding counted as an overlap, the voxel would be projected again next to neighbours that have not moved
-// yet, and the two solvers would disagree more with each exchange.
+// rounding counted as an overlap, the voxel would be projected again, beside neighbours that have not moved
+// yet. Then the two solvers would disagree more with each exchange.
 void Multigrid::add_motion(RowId row, const RowVector& way, Displacement& state,
                            const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;

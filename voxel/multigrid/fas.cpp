@@ -115,8 +115,8 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
 }
 
 // Notes that a row moved by `change` (m). A change too small for a sweep is still restricted, because small
-// forces on many voxels add up to a large one on the cell above. That force is four times as large on each
-// coarser level.
+// forces on many voxels add up to a large one on the cell above. From each level to the next this force grows
+// by a factor of four.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
   if (change <= restricted_m()) return;
   if (level == 0) bricks_.look_at(row);

@@ -5,9 +5,9 @@
 // If rows moved one after another, links to rows that have not moved yet would stop them, and voxels that
 // active limits tie together would not move. So all rows move first. Then voxels with a link beyond its limit
 // come back towards their start until no link is violated. At the start no link was violated. So one end of a
-// violated link can always come nearer to its start, and no voxel ever has to move away from its start again.
-// Difference constraints are closed under minimum and maximum. So if all voxels on an axis move the same way,
-// they come back by the least amount, whatever the order.
+// violated link can always come nearer to its start, and no voxel has to move away from its start on the way
+// back. States that satisfy difference constraints are closed under minimum and maximum. So if all voxels on
+// an axis move the same way, they come back by the least amount, whatever the order.
 #pragma once
 
 #include <algorithm>
