@@ -18,10 +18,10 @@ namespace {
 // not along the mode and holds the rest back: near the edge of the active nodes the error is constant. From 2
 // on the energy may grow.
 constexpr double kOverrelaxation = 1.5;
-// kOverrelaxation after a patch has moved. The patch's new nodes are interpolated, and their residual is not
-// an error of the far field. A sliding tool would feel a full step.
+// Replaces kOverrelaxation after a patch has moved. The patch's new nodes are interpolated, and their
+// residual is not an error of the far field. A sliding tool would feel a full step.
 constexpr double kAfterMove = 0.5;
-constexpr double kMaxStep = 0.5;  // of one cycle, relative to the mode
+constexpr double kMaxStep = 0.5;  // largest step in one cycle, relative to the mode
 
 }  // namespace
 

@@ -27,8 +27,8 @@ struct LevelView {
   // Written by residual_of_level(). A node is active if it is at its bound and pulled against the bound. It
   // is free if it may move and is not active. is_free and is_active hold 1 or 0.
   float *residual, *is_free, *is_active;
-  // Stiffness of the spring that active nodes of finer levels add to a node; 1 / (diagonal + that stiffness),
-  // null: none.
+  // active_stiffness: of the spring that active nodes of finer levels add to a node. inverse_with_active: 1 /
+  // (diagonal + active_stiffness); null: there are no such springs.
   float *active_stiffness, *inverse_with_active;
   std::array<const float*, 3> weight;  // [d] of the link to the next node along d (unit: link between voxels)
   const float *inverse_diagonal, *diagonal;  // of the stiffness matrix; inverse 0: the node does not move
@@ -111,8 +111,8 @@ ModeResponse mode_response(const LevelView& view, const float* mode, const std::
 // u += by · mode, within the bounds.
 void step_along_mode(float* u, const float* mode, float by, const float* lower, const float* negated_upper,
                      std::size_t count) noexcept;
-// u is `before` plus a correction. If the correction raised the energy, it is shortened to the least energy
-// along it. `before` becomes scratch.
+// u is `before` plus a correction. If more than half of the correction lies beyond the energy minimum along
+// it, the correction is shortened towards that minimum. `before` becomes scratch.
 void shorten_correction(const LevelView& view, float* before) noexcept;
 
 }  // namespace voxel::composite

@@ -46,8 +46,8 @@ bool CompositeGrid::nodes_of_face(const Level& level, const CoarseMaterial::Anch
   return true;
 }
 
-// Scattered anchors on a coarse level: each face between an anchored voxel and tissue holds a node. It also
-// cuts its share from the link in which it lies.
+// Scattered anchors on a coarse level: each face between an anchored voxel and tissue holds a node. If the
+// face lies in a link, the link's weight shrinks by the face's share of the area.
 void CompositeGrid::gather_anchors(Level& level) noexcept {
   const int step = level.step;
   Index3 low{}, high{};

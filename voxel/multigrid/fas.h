@@ -258,7 +258,7 @@ class Multigrid {
   void clear_batch() noexcept { limited_correction_.clear(); }
   // Finds all springs and takes all memory now, not when a tick first needs them.
   void prepare_all() noexcept;
-  void prepare_limit_loads() noexcept;  // memory that set_limit_load() writes to
+  void prepare_limit_loads() noexcept;  // takes the memory that set_limit_load() writes to
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

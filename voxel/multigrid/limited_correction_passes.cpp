@@ -9,8 +9,8 @@
 namespace voxel {
 namespace {
 
-// Largest mean number of visits per row. More occur only if rounding drives a row back and forth. Then all
-// rows return to their start.
+// Largest mean number of visits per row. More visits occur only if rounding drives a row back and forth. Then
+// all rows return to their start.
 constexpr std::size_t kMostVisits = 64;
 
 }  // namespace

@@ -267,8 +267,8 @@ glm::dvec3 Multigrid::block_pull(int level, std::size_t block, glm::dvec3& stiff
           along(link.spring, axis, link.d) * static_cast<double>(value[link.beside] - value[link.cell]);
     }
   }
-  // If the tool or an obstacle holds the block, its cells have boundary springs for that reason. These
-  // springs would hold the block along the surface, too.
+  // If the tool or an obstacle holds the block, its cells have boundary springs because of that. These
+  // springs would also hold the block along the surface, so they are left out.
   if (block_state_[block].held.count > 0 || blocks_->sprawls(block)) return pull;
   for (const RigidBlocks::Run& run : on.rows) {
     if (!boundary_springs_->any(level, run.row) || !prepare(level, run.row)) continue;
