@@ -9,8 +9,8 @@ namespace voxel {
 namespace {
 
 constexpr int kObstaclePasses = 8;
-// Margin of a wave (row_kernels.h) relative to the largest source: 3.5 roundings of a float. Other roundings
-// add to the violations that a wave leaves.
+// Margin of a wave (row_kernels.h), relative to the largest displacement of a source: 3.5 roundings of a
+// float. Other roundings add to the violations that a wave leaves.
 constexpr float kMargin = 2.1e-7F;
 
 }  // namespace
@@ -49,7 +49,7 @@ void ChainMail::spread_moves(Displacement& state, std::span<const VoxelId> voxel
         lowered_[lowered++] = {u[v], v};
       u[v] -= move;  // back to where no link is violated; the wave moves it again
     }
-    // Axes share the budget. The rest of one axis goes to the next.
+    // Axes share the budget. An axis passes the updates that it does not use to the next axis.
     const std::uint64_t share = std::max(kNearest, budget_left_ / static_cast<std::uint64_t>(3 - axis));
     const std::uint64_t used = wave_.spread(u, axis, Way::raise, {raised_.data(), raised}, margin, share);
     spend(used);
@@ -118,9 +118,10 @@ void ChainMail::enforce_obstacles_and_anchors(Displacement& state,
   spread_waiting(state);
 
   // Voxels that the wave pushed into obstacles are put back onto them, and the sources yield. An obstacle
-  // with its normal along an axis needs one pass: at rest all voxels are clear, so the correction leads away
-  // from other obstacles. A correction onto an oblique obstacle has components on other axes, too, and may
-  // need further passes.
+  // with its normal along an axis needs one pass. The reason: undisplaced voxels are clear of all obstacles,
+  // and the correction moves voxels back towards their undisplaced places. So it moves none into another
+  // obstacle. A correction onto an oblique obstacle has components on other axes, too, and may need further
+  // passes.
   bool clear = obstacles.empty();
   const auto stop = [&](Stop which) {
     for (int n = 0; n < kObstaclePasses && !clear; ++n) {

@@ -42,10 +42,10 @@ class ChainMail {
   // of the result. Rounding does not accumulate over calls: a link is violated by a few roundings of its ends
   // at most. Allocates nothing.
   //
-  // Row updates beyond `budget` (one is about 0.1 us) wait, and later calls of either function finish them.
-  // Until then a link is violated only if one of its ends is in a row of waiting_rows(). Between calls voxels
-  // may be moved within the limits of their links, where these are feasible. When no row waits, no link is
-  // violated.
+  // Row updates beyond `budget` (one is about 0.1 us) wait, and later calls of settle() or finish() make
+  // them. Until then a link is violated only if one of its ends is in a row of waiting_rows(). Between calls
+  // voxels may be moved within the limits of their links, where these limits are feasible. When no row waits,
+  // no link is violated.
   void settle(Displacement& state, std::span<const VoxelId> sources, std::span<const glm::vec3> moves,
               std::span<const Obstacle> obstacles, std::uint64_t budget = kUnlimited) noexcept;
   // Continues with the waiting rows.

@@ -2,7 +2,7 @@
 // Limits of the links for a wave, by the labels of their two voxels.
 //
 // The limit of a link between two labels is the mean of the limits within each (Lattice). So each label
-// contributes half a limit, and a wave needs tables by label alone.
+// contributes half of its own limit, and the tables of a wave need one entry per label.
 #pragma once
 
 #include <array>

@@ -151,8 +151,9 @@ struct ConeHalf {
     return exceeds<kRaise>(required_value<kRaise>(apex_at(c, n), least_fall), c.own[n * kRow + nearest],
                            margin);
   }
-  // Number of consecutive rows raised, upwards or downwards from row 0. If a row is raised by clearly more
-  // than rounding, so are the rows before it; so the search may begin there.
+  // Number of consecutive rows raised, upwards or downwards from row 0. If the guessed row is raised by
+  // clearly more than rounding, all rows before it are raised, too. Then the search begins at the guessed
+  // row.
   template <bool kRaise, int kStep>
   [[nodiscard]] HYBRID_INLINE int end(const ConeColumn& c, int guess, int most, float margin) const {
     int n = guess > most ? most : guess;

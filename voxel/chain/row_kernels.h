@@ -51,11 +51,11 @@ Moved lower_along_alike(float* row, float up, float down, float margin) noexcept
 // apex + n·slope − fall[i]. Row 0 is the row at the y of the cone's apex. The cone is written in half rows (a
 // cache line each). Each half ends before the first row in which its lane with the least fall is not raised
 // by more than the margin. In a state without violations, voxels further from the apex are raised less. So
-// the end is searched from a guess.
+// the search for the end can start at a guess.
 struct ConeColumn {
   float* own = nullptr;                     // row 0
   std::ptrdiff_t next = 0;                  // offset from a row to the one to prefetch (floats)
-  int up = 0, down = 0;                     // most rows above and below row 0
+  int up = 0, down = 0;                     // greatest numbers of rows above and below row 0
   double apex = 0.0;                        // the cone's value in row 0 without fall (m)
   double slope_up = 0.0, slope_down = 0.0;  // change per row for n > 0, for n < 0 (m)
   const float* fall = nullptr;              // [kRow] (m), >= 0
@@ -63,7 +63,7 @@ struct ConeColumn {
   bool has_apex = false;                    // the half of row 0 with this lane counts as raised
 };
 // Numbers of rows raised above and below row 0: in the half with the nearest lane (near), and in the other
-// half (far, never more). As input they are guesses.
+// half (far; never more than near). As input they are guesses.
 struct ConeEnds {
   int near_up = 0, near_down = 0, far_up = 0, far_down = 0;
 };

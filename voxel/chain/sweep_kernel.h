@@ -14,8 +14,8 @@ namespace voxel {
 
 inline constexpr std::uint32_t kFullRow = 0xFFFFFFFFU;  // RowInfo::free of a row of free voxels
 
-// All data that decides how a row is relaxed. They lie together because one visit reads those of several
-// rows.
+// The data that decide how a row is relaxed. They lie together in memory, because one visit reads the data of
+// several rows.
 struct RowInfo {
   std::uint32_t free = 0;     // bit of each lane: a voxel that is not anchored
   std::uint8_t label = 0;     // label of a row that is full of free voxels of one label; else 0
@@ -76,13 +76,14 @@ struct SweepResult {
   int end = 0;     // rows that are done
   int visits = 0;  // rows that were relaxed
 };
-// moves[n]: Moved bits of row n, for the rows up to `end`. Ends early before a row that has an anchor or is
-// beside a row with one, and after `most_visits` visits.
+// Relax the rows of a task. moves[n]: Moved bits of row n, for the first `end` rows. The sweep ends early
+// after `most_visits` visits. It also ends before a row if that row, or a row before it in y, z or x, has an
+// anchor.
 SweepResult sweep_raise(const SweepTask& task, int most_visits, Moved* moves) noexcept;
 SweepResult sweep_lower(const SweepTask& task, int most_visits, Moved* moves) noexcept;
 
-// The same for each register width that this processor has, in ascending order; the functions above use the
-// last. All give the same bits.
+// sweep_raise() and sweep_lower() for each register width that this processor has, the narrowest first. The
+// functions above use the last pair. All pairs give the same bits.
 struct SweepKernels {
   SweepResult (*raise)(const SweepTask&, int, Moved*);
   SweepResult (*lower)(const SweepTask&, int, Moved*);

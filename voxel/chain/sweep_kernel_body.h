@@ -67,9 +67,9 @@ HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
 
 // Finds the displacements that all paths within a row require. In each step the paths double their length:
 // one link, two, four, … Five steps suffice, where single links would take up to 31. Paths upwards and
-// downwards are independent, because a detour is never stronger than the direct path. Both are interleaved,
-// because each step waits for the one before. `up`: limits between lanes n − 1 and n. `down`: limits between
-// n and n + 1. False, and `required` undefined, if no voxel requires a move of its neighbour.
+// downwards are independent, because a detour is never stronger than the direct path. Their steps are
+// interleaved, because a step waits for the one before it. `up`: limits between lanes n − 1 and n. `down`:
+// limits between n and n + 1. False, with `required` undefined: no link requires a move.
 template <bool kRaise>
 HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& down, float margin,
                              RowValues& required) {
@@ -241,7 +241,7 @@ HYBRID_INLINE bool revisits_x(const SweepTask& p, const RowNow& row) {
                          *row.x, p.margin);
 }
 
-// Relaxes a row. `y` is the row before it in y, and becomes the row itself if it moved.
+// Relaxes a row. `y`: values of the row before it in y; on return those of this row, if it moved.
 template <bool kRaise, int kRegisters, class Limits>
 HYBRID_INLINE Moved sweep_row(const SweepTask& p, const RowNow& row, Limits& by_y, Limits& by_z,
                               const RowValues& z, RowValues& y) {
@@ -313,11 +313,11 @@ struct UniformRows {
   }
 };
 
-// Relaxes a row within one label, or next to labels with tighter limits. The links within the row then allow
-// whatever the rows before it require. The row requires nothing of the row before it in y either: that row
-// already has its value through the row before both in z, along a path of equal length. The reverse links in
-// z must still be checked, because the same argument for z relies on y. If the row before in x requires more,
-// the function does nothing and returns false.
+// Relaxes a row of one label beside rows of the same label or of labels with tighter limits. Links within the
+// row need no check: they allow whatever the rows before it require. The links back to the row before in y
+// need no check either: that row already has its value by a path of equal length, through the row before both
+// in z. The links back in z must be checked, because the same argument for z relies on y. If the row before
+// in x requires more, the function does nothing and returns false.
 template <bool kRaise>
 HYBRID_INLINE bool sweep_uniform(const SweepTask& p, UniformRows& rows, std::ptrdiff_t k, RowValues& y,
                                  Moved& what) {

@@ -13,8 +13,8 @@
 //   move is "pulled": it stays, and its row is noted.
 //
 // A wave that reaches its limit of row updates stops, and the rows whose links it has yet to relax wait. If a
-// link is violated, the voxel that requires the other one to move is in a waiting row. So later waves from
-// the waiting rows, raising and lowering, repair all violations, whatever else has moved meanwhile.
+// link is violated, the voxel that requires the other one to move is in a waiting row. So later waves that
+// raise and lower from the waiting rows repair all violations. This holds whatever else has moved in between.
 #pragma once
 
 #include <array>
@@ -56,12 +56,12 @@ class ChainWave {
   // bit of the result.
   std::uint64_t spread(float* u, int axis, Way way, std::span<Source> sources, float margin,
                        std::uint64_t most = kUnlimited) noexcept;
-  // Moves the neighbours of anchors that waves in the other direction pulled, on this axis and in direction
-  // `way`.
+  // Starts at the rows of the anchors that waves on this axis pulled in the other direction. Moves voxels in
+  // direction `way`.
   std::uint64_t spread_from_pulled(float* u, int axis, Way way, float margin,
                                    std::uint64_t most = kUnlimited) noexcept;
   // To continue with the waiting rows, call take_waiting(), then one wave for each axis and direction, then
-  // put_back() for the rows that these left.
+  // put_back(): taken rows that still have links to relax wait again.
   void take_waiting() noexcept;
   std::uint64_t spread_from_taken(float* u, int axis, Way way, float margin,
                                   std::uint64_t most = kUnlimited) noexcept;
@@ -135,7 +135,8 @@ class ChainWave {
   }
   void look_up(RowId row) noexcept;
   [[nodiscard]] bool free(VoxelId v) noexcept { return (info(v / kRow).free >> (v % kRow) & 1U) != 0; }
-  // `ends`: Mark bits first and last, of the ends whose links across to the next row must be relaxed.
+  // `ends`: Mark bits `first` and `last`, for the ends of the row whose links to the next row along x must be
+  // relaxed.
   void enqueue(RowId row, std::uint8_t ends = first | last) noexcept;
   void note_pulled(const WaveArgs& p, RowId row) noexcept;
   // Visits at most `most` rows of the queue; the others wait.

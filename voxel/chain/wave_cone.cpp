@@ -9,8 +9,9 @@
 namespace voxel {
 // Extent of a cone along the three lines through its apex. If the box of these extents, with one voxel beyond
 // each end, holds free voxels only, the cone raises nothing outside. The reason: if a voxel is raised, so are
-// all voxels on every shortest path to it, and one of these paths runs along such a line. The ends must not
-// be found by bisection: where a cone lies on an older one, rounding decides which voxels are raised.
+// all voxels on every shortest path to it. One shortest path to a voxel outside first follows one of the
+// lines beyond its end, where no voxel is raised. The ends must not be found by bisection: where a cone lies
+// on an older one, rounding decides which voxels are raised.
 ChainWave::ConeBox ChainWave::cone_box(const WaveArgs& p, VoxelId apex) noexcept {
   ConeBox box;
   const Grid& grid = lattice_.grid();
@@ -134,7 +135,8 @@ void ChainWave::write_cone(const WaveArgs& p, VoxelId apex, const ConeBox& box) 
   }
 }
 
-// Where the box ends at a voxel that is not free, the wave may continue round it, or pull an anchor.
+// Where the box ends at a voxel that is not free, the wave may continue round that voxel or pull an anchor.
+// So the rows there are queued.
 void ChainWave::enqueue_cut_faces(VoxelId apex, const ConeBox& box) noexcept {
   const Grid& grid = lattice_.grid();
   const std::array<int, 3> at = lattice_.coordinates(apex);

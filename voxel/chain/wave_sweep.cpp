@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Sweeps of ChainWave away from the sources: fast sweeping (Zhao 2005).
 //
-// Planes (z), in each plane columns, and in each column rows are relaxed outwards from the sources, each row
-// from the rows before it. This is the order of paths without detours. If a row requires a move of a row
-// before it, a path has a detour, and that row is visited again: within a plane until nothing is pending,
-// between planes on the way back. A visit reads and writes a row once. With a queue, each neighbour would
-// read it, and a detour found late would invalidate everything done since.
+// Rows are relaxed outwards from the sources: plane by plane (z), within a plane column by column, within a
+// column row by row. Each row is relaxed from the rows before it. This is the order of paths without detours.
+// If a row requires a move of a row before it, a path has a detour, and the earlier row is visited again.
+// Within a plane, sweeps repeat until no row is pending; between planes, the sweep in the opposite direction
+// visits the row. A visit reads and writes a row once. With a queue, the visits to its neighbours would read
+// the row, too, and a detour found late would invalidate everything computed since.
 #include <algorithm>
 #include <utility>
 
@@ -74,8 +75,8 @@ bool ChainWave::start_sweep(const WaveArgs& p, std::span<const Source> sources, 
   return true;
 }
 
-// Notes a swept strip of `count` rows from `row` (at y) on. Rows after a moved row in z become pending, and
-// the rows beside and before it according to moves_.
+// Notes a swept strip of `count` rows from `row` (at y) on. The row after a moved row in z becomes pending.
+// The rows beside it in x and the rows before it become pending if its bits in moves_ require that.
 void ChainWave::note_swept(Sweep& sweep, RowId row, int y, int count) noexcept {
   const Plane& plane = sweep.plane;
   const RowId row_x = lattice_.grid().row_x, row_z = lattice_.grid().row_z;
@@ -85,7 +86,7 @@ void ChainWave::note_swept(Sweep& sweep, RowId row, int y, int count) noexcept {
                      from_x = plane.x > 0 ? kFromBelowX : kFromAboveX,
                      back_x = plane.x > 0 ? kFromAboveX : kFromBelowX;
   const int at_end = plane.x > 0 ? kLastMoved : kFirstMoved;
-  // All rows of a line in y are looked up together.
+  // This looks up the RowInfo of all rows of the two lines in y beside the strip.
   (void)info(row + beside);
   (void)info(row - beside);
   // Local copies: the compiler would reload members after each byte that is written below.

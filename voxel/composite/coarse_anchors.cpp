@@ -142,8 +142,8 @@ bool CoarseMaterial::anchor_near(const Index3& p, const Index3& q, int span) con
   return false;
 }
 
-// Start of the nearest line along d that has tissue in it and is at most half of its length away. If there is
-// none, the start of the line at p.
+// Start of the nearest line along d that has tissue in it and is at most `links` / 2 away (voxels). If there
+// is none, the start of the line at p.
 CoarseMaterial::Index3 CoarseMaterial::nearest_tissue_line(const Index3& p, std::size_t d,
                                                            int links) const noexcept {
   const auto any = [&](Index3 q) {

@@ -184,8 +184,9 @@ void CoarseMaterial::count_cells() {
   }
 }
 
-// Stiffness of the smallest stored cubes: along each axis their columns of 4 cells in series. A column of n
-// cells contributes n² / Σ compliance, so that n equal cells contribute n times their stiffness.
+// Finds the stiffness of the smallest stored cubes. Along each axis, the 4 cells of a column are in series,
+// and the columns are in parallel. A column of n cells contributes n² / Σ compliance, so that n equal cells
+// contribute n times their stiffness.
 void CoarseMaterial::find_stiffness() {
   CubeLevel& fine = levels_[kFirstLevel];
   constexpr int kEdge = 1 << kFirstLevel;
@@ -244,8 +245,8 @@ float CoarseMaterial::cell_count(const CubeLevel& level, int m, const Index3& cu
   return cells;
 }
 
-// From cubes to cubes twice as large: along an axis two cubes of a column in series, four columns in
-// parallel.
+// Stiffness of cubes twice as large. Along an axis, the two cubes of a column are in series, and the four
+// columns are in parallel.
 void CoarseMaterial::coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse) const {
   const int m = static_cast<int>(&below - levels_.data());
   const std::size_t cubes = index(coarse.dims[0]) * index(coarse.dims[1]) * index(coarse.dims[2]);
@@ -285,7 +286,7 @@ void CoarseMaterial::cell_counts(int m, int z, int first_x, int nx, int first_y,
                                  float* out) noexcept {
   const int edge = 1 << m;
   if (fills_box_) {
-    // Length of a cube within the box, axis by axis.
+    // Length along d of the part of a cube that lies within the box.
     const auto within = [&](std::size_t d, int number) {
       const int from = std::max(number * edge, low(d)), to = std::min((number + 1) * edge, high(d));
       return static_cast<float>(std::max(0, to - from));
@@ -353,7 +354,7 @@ void CoarseMaterial::cube_stiffness(int m, int z, int first_x, int nx, int first
     }
     return;
   }
-  // Cubes of eight cells; mostly all eight have the same stiffness.
+  // Cubes of eight cells. In most cubes all eight have the same stiffness.
   const int wide = 2 * nx;
   const std::size_t layer_of = index(wide) * index(2 * ny), ranks = stiffness_.size();
   cell_scratch_.resize(2 * layer_of);

@@ -68,10 +68,10 @@ class CoarseMaterial {
   // Cells in each cube of plane z, from cube (first_x, first_y) on. out: [y][x], nx to a row.
   void cell_counts(int m, int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
   // Where tissues differ: cells of each cube times their stiffness along axis d, relative to the reference.
-  // out[d]: as above.
+  // out[d]: [y][x], nx to a row.
   void cube_stiffness(int m, int z, int first_x, int nx, int first_y, int ny,
                       const std::array<float*, 3>& out) noexcept;
-  // Stiffness of single cells, relative to the reference; 0 where there is no cell. out: as above.
+  // Stiffness of single cells, relative to the reference; 0 where there is no cell. out: [y][x], nx to a row.
   void cell_stiffness(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
 
   // ---- anchors (coarse_anchors.cpp) ----
@@ -110,7 +110,7 @@ class CoarseMaterial {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr int kFirstLevel = 2;        // level of the smallest cubes with stored counts, in bytes
+  static constexpr int kFirstLevel = 2;        // level of the smallest cubes whose counts are stored
   static constexpr int kFirstAnchorLevel = 3;  // level of the smallest cubes with anchor marks
   struct CubeLevel {
     Index3 dims{};

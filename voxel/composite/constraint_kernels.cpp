@@ -121,9 +121,9 @@ HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
   }
 }
 
-// Nodes at a bound must move with the bound before the cycle. In a tight cone of bounds, nodes are pulled
-// only where the cone's planes meet. So smoothing alone would move the cone by one node a sweep. A node
-// beyond its bound is moved onto the bound.
+// Nodes at a bound must move with the bound before the cycle. A cone of bounds is piecewise linear, so links
+// pull the nodes on it only where its planes meet. Smoothing alone would therefore move the cone by one node
+// a sweep. A node beyond its bound is moved onto the bound.
 HYBRID_MULTIVERSIONED void follow_bounds(float* u, const float* at_bound, const float* lower,
                                          const float* negated_upper, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; n += kLanes) {

@@ -51,8 +51,8 @@ float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std
 
 // A coarse level is a discretisation of its own. Its links may be weaker than the fine level's stiffness
 // against a prolonged correction: at a node that barely touches the tissue, at links across a gap, at
-// anchors. A correction would then go too far. There a spring of the difference in stiffness holds the node
-// at its present displacement. The spring does not change the solution.
+// anchors. A correction would then go too far. There a spring holds the node at its present displacement; its
+// stiffness is the difference. The spring does not change the solution.
 void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) const noexcept {
   coarse.correction_springs.clear();
   if (material_.fills_box() && !material_.has_scattered_anchors()) return;

@@ -213,7 +213,7 @@ void CompositeGrid::prolong(std::size_t l, std::size_t a) noexcept {
       for (const bool high : {false, true}) {
         if (side || !(high ? nodes[0].open_high : nodes[0].open_low)) continue;
         const int i = high ? nodes[0].count - 1 : 0;
-        // The side nodes at the ends along x.
+        // Prolonged displacement of the side node at this end of the row.
         const auto interpolated = [&] {
           if (material_.is_heterogeneous()) return prolonged_by_links(fine, coarse, a, now, i, j, k);
           const float pj = nodes[1].weight_after[index(j)], pk = nodes[2].weight_after[index(k)];
@@ -264,7 +264,8 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     add_active_stiffness(last, a);
     for (int n = 0; n < kCoarsestSweeps; ++n) smooth(last);
     for (std::size_t l = last; l-- > 0;) {
-      // With links at their limits a correction may raise the energy, and cycles would diverge.
+      // With links at their limits a correction may raise the energy, and cycles would diverge. So the
+      // correction is shortened.
       if (multipliers_active_[a]) {
         Level& level = levels_[l];
         std::copy(level.u[a].begin(), level.u[a].end(), level.residual.begin());

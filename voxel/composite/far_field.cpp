@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Displacements far from the contact: extrapolated before a cycle, fitted after it.
 //
-// A cycle reduces the error there slowly, to about 0.6 of its size. The reason is that active nodes do not
-// move on coarser levels and hold the free nodes linked to them. But the error is nearly the same share of
-// the displacement everywhere. So one number per axis is found after each cycle: the multiple of the
-// unprescribed part of u that minimises the energy.
+// Far from the contact, a cycle reduces the error only to about 0.6 of its size. The reason is that active
+// nodes do not move on coarser levels and hold the free nodes linked to them. But the error is nearly the
+// same share of the displacement everywhere. So after each cycle a multiple of one mode is added to u, on
+// each axis. The mode is the part of u that bounds do not prescribe (beyond_bounds()). The multiple is chosen
+// to minimise the energy.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -17,10 +18,10 @@ namespace {
 // not along the mode and holds the rest back: near the edge of the active nodes the error is constant. From 2
 // on the energy may grow.
 constexpr double kOverrelaxation = 1.5;
-// kOverrelaxation after a patch has moved. The patch's new nodes are interpolated, and their residual is not
-// an error of the far field. A sliding tool would feel a full step.
+// Replaces kOverrelaxation after a patch has moved. The patch's new nodes are interpolated, and their
+// residual is not an error of the far field. A sliding tool would feel a full step.
 constexpr double kAfterMove = 0.5;
-constexpr double kMaxStep = 0.5;  // of the mode, in one cycle
+constexpr double kMaxStep = 0.5;  // largest step in one cycle, relative to the mode
 
 }  // namespace
 

@@ -53,8 +53,8 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   levels_.resize(count);
   for (std::size_t l = 0; l < count; ++l) allocate(levels_[l], l);
   if (covering_level_ > 0) allocate_for_moves();
-  // Scratch of weigh(): one plane of half cells. Along each axis there are two for each node, and one more on
-  // either side.
+  // Scratch of weigh(): one plane of half cells. Along each axis there are two half cells for each node, and
+  // one more at each end.
   std::size_t most = 0, most_nodes = 0, most_floats = 0;
   for (const Level& level : levels_) {
     for (const AxisNodes& axis : level.nodes) most = std::max(most, axis.coarse.size());
@@ -164,8 +164,8 @@ void CompositeGrid::find_chains_to_anchors() {
   if (material_.has_scattered_anchors()) links_to_anchor_ = material_.links_to_anchors();
 }
 
-// On each axis the displacement is at most that of a chain to the nearest anchor, each link at the widest
-// limit.
+// On each axis the displacement is at most the extension of a chain to the nearest anchor with each link at
+// the widest limit.
 glm::dvec3 CompositeGrid::clamp_to_nearest_anchor(const Index3& voxel, const glm::dvec3& u) const noexcept {
   const std::uint32_t s = lattice_.surface_number(lattice_.at(voxel[0], voxel[1], voxel[2]));
   if (s >= links_to_anchor_.size()) return u;

@@ -3,9 +3,9 @@
 // McCormick 1989). The work of a cycle is bounded.
 //
 // A push moves voxels up to a distance of depth / slack. A push of 20 spacings at slack 0.1 moves 10^7
-// voxels, and writing them takes milliseconds. But the further from the contact, the smoother displacements
-// are. So level 0 is a patch of voxels round the contact. Level l is a patch of about as many nodes, which
-// are 2^l voxels apart. One of the levels covers the whole object. Nodes outside the finer patch are
+// voxels, and writing them takes milliseconds. But displacements get smoother with the distance from the
+// contact. So level 0 is a patch of voxels round the contact. Level l is a patch of about as many nodes,
+// which are 2^l voxels apart. One of the levels covers the whole object. Nodes outside the finer patch are
 // unknowns. Nodes under the finer patch hold its displacements, in the full approximation scheme (FAS). All
 // other voxels are interpolated on request. Work and memory grow with the logarithm of the object's size, not
 // with the depth.
@@ -13,9 +13,10 @@
 // Shape. The stiffness of a link between two nodes follows from the tissue round it (coarse_material.h): on
 // level 0 it is that of the lattice, on coarser levels a mean. No link crosses a gap. Anchors hold nodes by
 // springs. Where a whole side is anchored, the distance to the anchor gives the spring. Elsewhere the spring
-// includes the constriction of the load that spreads from the anchors (scattered_anchors.cpp). A coarse level
-// may be weaker than the finer level's resistance to its corrections. There springs shorten the corrections
-// (correction_springs.cpp). Tissues may differ in stiffness, but not in limits or Poisson's ratio.
+// includes the constriction of the load that spreads from the anchors (scattered_anchors.cpp). The links of a
+// coarse level may be weaker than the finer level's resistance to its corrections. There springs shorten the
+// corrections (correction_springs.cpp). Tissues may differ in stiffness, but not in limits or Poisson's
+// ratio.
 //
 // Limits. In a convex body of one tissue the equilibrium within the chain limits solves an obstacle problem:
 // each node v lies between L = max(u(s) − dist(v→s)) and U = min(u(s) + dist(s→v)) over the pressed voxels s,
@@ -78,9 +79,9 @@ class CompositeGrid {
   // Begins a contact at voxel `centre`, with all displacements 0. Patches stay where they are if the voxel is
   // near the middle of level 0's patch.
   void begin(const Index3& centre) noexcept;
-  // Call it once a tick. It moves one patch after the contact. It moves more patches if the contact is too
-  // far from the middle of level 0, or if a finer patch would no longer be nested. True if the patch of level
-  // 0 moved.
+  // Call it once a tick. It moves one patch so that it follows the contact. It moves more patches if the
+  // contact is too far from the middle of level 0, or if a finer patch would no longer be nested. True if the
+  // patch of level 0 moved.
   bool centre_on(const Index3& centre) noexcept;
   // Box of the voxels of level 0's patch that may be moved; `low` and `high` are included.
   void fine_patch(Index3& low, Index3& high) const noexcept;
@@ -181,8 +182,8 @@ class CompositeGrid {
     Index3 voxel;
     std::uint32_t surface;
   };
-  // Force of an obstacle along its normal (N), relaxed over the cycles, from which its loads follow; and the
-  // level of its node.
+  // Force of an obstacle along its normal (N), relaxed over the cycles, and the level of its node. The loads
+  // of the obstacle follow from this force.
   struct ObstacleLoad {
     float along_normal_N = 0.0F;
     std::uint32_t level = 0;

@@ -22,11 +22,13 @@ struct AxisNodes {
   // By node: the coarse node at or before it; the weight of the next coarse node (0 or 0.5).
   std::vector<int> coarse;
   std::vector<float> weight_after;
-  // The same for whole rows along x: lane i lies at or after the coarse lane base + (i + odd) / 2.
+  // `coarse` and `weight_after` for whole rows along x: lane i lies at or after the coarse lane base + (i +
+  // odd) / 2.
   int base = 0;
   bool odd = false;
   std::vector<float> lane_weight;
-  // By coarse node: the node at its place, at most one beyond either end; kOutside if it lies further out.
+  // By coarse node: index of the node at its place, which may be one beyond either end; kOutside: further
+  // out.
   std::vector<int> fine;
   int coarse_first = 0, coarse_last = -1;  // coarse nodes strictly within this patch
   // By coarse node: restriction weights of the nodes before, at and after it.
@@ -38,7 +40,7 @@ struct AnchorFaces {
   Floats count, in_link, distance, constriction;
 };
 // Springs that hold a node at its present displacement, beside the springs of its links. Without them
-// corrections would move it too far. [d] relative to a link between two voxels, like weights.
+// corrections would move it too far. weight [d]: stiffness relative to a link between two voxels.
 struct CorrectionSpring {
   std::uint32_t node;
   std::array<float, 3> weight;
@@ -48,7 +50,7 @@ struct CorrectionSpring {
 struct Ghost {
   std::uint32_t at, first, count;
 };
-// The node that a surface voxel beside a rigid surface stands for.
+// A node beside a rigid surface, and the surface voxel whose obstacle applies to it.
 struct ObstacleNode {
   Index3 node;
   std::size_t number;
@@ -64,7 +66,7 @@ struct GridLevel {
   bool moved = false;     // nodes may have moved since put_to_rest()
   std::array<AxisNodes, 3> nodes;
   std::size_t stride = 8, plane = 0;
-  // [axis] Displacement (m); 1 at the lower bound, −1 at the upper bound, else 0.
+  // [axis] u: displacement (m). at_bound: 1 at the lower bound, −1 at the upper bound, else 0.
   std::array<Floats, 3> u, at_bound;
   // [d] Stiffness of the link to the next node, and of links to anchors, relative to a link between two
   // voxels.

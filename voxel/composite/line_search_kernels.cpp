@@ -8,8 +8,8 @@
 namespace voxel::composite {
 namespace {
 
-// A correction that overshoots the least energy by half of itself leaves the energy as it was. A correction
-// that overshoots by more is shortened, by at most kMaxShortening of itself.
+// If half of a correction lies beyond the energy minimum, the energy does not change. If more lies beyond,
+// the correction is shortened, by at most kMaxShortening of its length.
 constexpr double kMinOvershoot = 0.5, kMaxShortening = 0.9;
 
 }  // namespace
@@ -103,7 +103,7 @@ HYBRID_MULTIVERSIONED ModeResponse mode_response(const LevelView& v, const float
 }
 
 HYBRID_MULTIVERSIONED void shorten_correction(const LevelView& v, float* before) noexcept {
-  // Up to and including the side plane beyond the last plane of unknowns: prolongation moved that plane too.
+  // The side plane beyond the last plane of unknowns is included, because prolongation moved it, too.
   const std::size_t count = static_cast<std::size_t>(v.last[2] + 2) * v.plane;
   for (std::size_t n = 0; n < count; n += kLanes) {
     Float8 x, was;

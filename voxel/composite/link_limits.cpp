@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Multipliers of links at their limits, where bounds of nodes do not suffice.
 //
-// In a body of one tissue bounds suffice (grid.h). With bounds alone, a soft tissue between stiffer ones
-// would be compressed beyond its limits. There each link at its limit carries a reaction beside its spring:
-// the multiplier of the limit. The multiplier is stored as additional stiffness. After each cycle links
-// beyond their limit become stiffer, and links within it softer again, but never softer than their spring.
-// The equilibrium is then the optimum within the limits: a reaction acts along its link, only at the limit,
-// and only against its violation. Cycles need no change, because a level knows its links by their weights
-// alone. The energy of the springs does not count multipliers.
+// In a body of one tissue bounds suffice (grid.h). But with bounds alone, a soft tissue between stiffer ones
+// would be compressed beyond its limits. So where tissues differ, each link at its limit also carries a
+// reaction: the multiplier of the limit. The multiplier is stored as additional stiffness. After each cycle,
+// links beyond their limit become stiffer. Links within their limit become softer again, but never softer
+// than their spring. The equilibrium is then the optimum within the limits: a reaction acts along its link,
+// only at the limit, and only against its violation. Cycles need no change, because a level knows its links
+// by their weights alone. The energy of the springs does not count multipliers.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -74,8 +74,8 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
   for (Level& level : levels_) update_diagonal(level, a);
 }
 
-// Updates the multipliers of the links to anchors in the same way. Returns the largest limited / weight, >=
-// 1.
+// Updates the multipliers of the links to anchors, as update_row_weights() does for links between nodes.
+// Returns the largest limited / weight, >= 1.
 float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std::size_t d) noexcept {
   float most = 1.0F;
   if (!level.has_anchors) return most;
@@ -95,7 +95,7 @@ float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std:
   return most;
 }
 
-// Under the finer level a link gets the factor by which its two fine links, in series, have become stiffer.
+// Within the finer patch, multipliers stiffen a link by the same factor as its two fine links in series.
 void CompositeGrid::restrict_multipliers(std::size_t l, std::size_t a) noexcept {
   const Level& fine = levels_[l - 1];
   Level& coarse = levels_[l];
@@ -127,7 +127,7 @@ void CompositeGrid::restrict_multipliers(std::size_t l, std::size_t a) noexcept 
   }
 }
 
-// Diagonal and its inverse from the weights that now hold on axis `a`.
+// Finds the diagonal and its inverse from the weights that now apply on axis `a`.
 void CompositeGrid::update_diagonal(Level& level, std::size_t a) const noexcept {
   const auto& nodes = level.nodes;
   const auto& weight = weights_on(level, a);

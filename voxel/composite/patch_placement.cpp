@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Placement of the patches of a CompositeGrid. Building a level costs a tenth of a tick's work or more. So
-// levels are built one a tick: before a contact, while the tool approaches, and one after another while a
-// contact moves.
+// levels are built one after another, one in a tick: before a contact while the tool approaches, and during a
+// contact while the contact moves.
 #include <algorithm>
 #include <cstdlib>
 

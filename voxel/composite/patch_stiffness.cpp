@@ -10,7 +10,8 @@ namespace {
 
 using composite::index;
 
-// Two halves of a link in series, each given by its cells and its cells times stiffness.
+// Stiffness of a link from its two halves in series. Each half is given by its number of cells and by that
+// number times their stiffness.
 float in_series(float cells_a, float stiff_a, float cells_b, float stiff_b) {
   if (cells_a == 0.0F || cells_b == 0.0F) return stiff_a + stiff_b;
   const float cells = cells_a + cells_b;
@@ -40,7 +41,8 @@ void CompositeGrid::weigh_shape(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Links between voxels: the mean of the four cells round each. `all_alike`: as if all had the same stiffness.
+// Weighs each link between two voxels by the mean stiffness of the four cells round it. `all_alike`: counts
+// all cells as equally stiff.
 void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weight, bool all_alike) noexcept {
   const auto& nodes = level.nodes;
   const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count, wide = nx + 1;
@@ -77,8 +79,8 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Adds to links between voxels the excess of tissue too thin to fill a cell (LinkParts::thin). Coarse levels
-// know cells only: on them thin tissue moves with the tissue beside it.
+// Adds to the links between voxels the excess stiffness of tissue that is too thin to fill a cell
+// (LinkParts::thin). Coarse levels know cells only: on them thin tissue moves with the tissue beside it.
 void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& weight,
                                     bool all_alike) noexcept {
   const auto& nodes = level.nodes;
@@ -118,8 +120,8 @@ void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& w
   }
 }
 
-// Excess of thin tissue on the link along d from voxel v in the middle plane of voxel_planes_, relative to
-// the reference stiffness.
+// Excess stiffness of thin tissue on the link along d from voxel v in the middle plane of voxel_planes_,
+// relative to the reference stiffness.
 template <class Stiffness>
 float CompositeGrid::thin_excess(std::size_t v, std::size_t d, std::size_t wide,
                                  const Stiffness& stiffness) const noexcept {
@@ -181,7 +183,8 @@ void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weig
   }
 }
 
-// Where tissues differ: half cells side by side in parallel, the two halves of the link in series.
+// Weighs links where tissues differ. Half cells side by side are in parallel, the two halves of a link are in
+// series.
 void CompositeGrid::weigh_tissues(Level& level) noexcept {
   if (level.step == 1) {
     weigh_cells(level, level.weight, false);

@@ -11,7 +11,7 @@ namespace {
 
 using composite::index;
 
-constexpr std::size_t kFewerGhosts = 16;  // an object that fills its box has so many times fewer ghosts
+constexpr std::size_t kFewerGhosts = 16;  // factor by which an object that fills its box has fewer ghosts
 // A side with more than this share of anchors gets a node at or beyond it.
 constexpr double kAnchoredSide = 0.25;
 constexpr float kMinWeight = 1e-3F;   // of a full link: a link of less weight is missing
@@ -80,7 +80,7 @@ void CompositeGrid::allocate(Level& level, std::size_t l) const {
   level.ghost_neighbours.reserve(floats / share);
 }
 
-// before_move_ has room for any level that moves.
+// Gives before_move_ room for the nodes of any level that moves.
 void CompositeGrid::allocate_for_moves() {
   std::size_t most = 0;
   for (std::size_t l = 0; l < covering_level_; ++l) {
@@ -155,7 +155,7 @@ void CompositeGrid::set_up_transfer(Level& fine, Level& coarse) const noexcept {
     std::fill(nodes.weight_after.begin(), nodes.weight_after.end(), 0.0F);
     for (int i = 0; i < nodes.count; ++i) {
       const int away = fine.at(d, i) - to.begin;
-      // Beyond the ends of the coarse level its end node is extrapolated.
+      // A fine node beyond an end of the coarse level takes the value of the end node.
       const int before = std::clamp(floor_to_multiple(away, coarse.step) / coarse.step, 0, to.count - 1);
       nodes.coarse[index(i)] = before;
       const bool between = away > before * coarse.step && before + 1 < to.count;
@@ -223,7 +223,7 @@ void CompositeGrid::find_anchor_weights(Level& level, bool near) noexcept {
   for (Floats& weight : level.anchor_weight) std::fill(weight.begin(), weight.end(), 0.0F);
   for (int k = 0; k < nodes[2].count; ++k) {
     for (int j = 0; j < nodes[1].count; ++j) {
-      // In an object that fills its box, rows without anchors near have nothing to look for.
+      // In an object that fills its box, rows without nearby anchors need no search.
       const bool anchors_near = near && row_near_anchors(level, j, k);
       if (!anchors_near && material_.fills_box()) continue;
       for (int i = 0; i < nodes[0].count; ++i) {

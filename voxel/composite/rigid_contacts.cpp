@@ -2,8 +2,9 @@
 // Contacts of a CompositeGrid with rigid surfaces that stand still.
 //
 // Each surface voxel beside such a surface has an obstacle: a half-space for its displacement. On level 0 the
-// voxel is a node and has this bound itself. On coarser levels, outside of the finer patch, the node nearest
-// to the voxel has it. If several voxels have the same nearest node, the one with the least gap counts.
+// voxel is a node, and the half-space bounds this node. On coarser levels, outside the finer patch, the
+// half-space bounds the node nearest to the voxel. If several voxels have the same nearest node, the voxel
+// with the least gap counts.
 //
 // Axes are relaxed one after the other, so a contact is split. On the axis of its normal's largest component
 // it is a bound: the height of the plane at the node's place. On the other axes it is a load: the bound's
@@ -11,7 +12,8 @@
 // friction. A load covers half of its difference from the bound's force in each cycle. Otherwise the two
 // would oscillate where a plane rises steeply along a soft axis.
 //
-// A bound stands whether or not its node is pressed (SoftObject::press_on_grid has the reason).
+// Nodes keep their bounds even if nothing presses them on the plane. SoftObject::press_on_grid gives the
+// reason.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -130,14 +132,15 @@ void CompositeGrid::press_on_obstacles() noexcept {
   }
 }
 
-// Bounds a node such that its voxel, which moves with it, comes to the plane.
+// Bounds a node such that its voxel, which moves with the node, lies on the plane when the node is at its
+// bound.
 void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, float gap) noexcept {
   const Obstacle& o = obstacles_[node.surface];
   if (o.normal == glm::vec3(0.0F)) return;
   const auto level = static_cast<std::uint32_t>(l);
   const int along = largest_axis(glm::dvec3(o.normal));
   const float normal = o.normal[along];
-  // A node of another level stands for another number of voxels.
+  // The stored force belongs to a node of another level, which stands for another number of voxels.
   ObstacleLoad& load = obstacle_loads_[node.surface];
   if (load.level != level) load = {0.0F, level};
   obstacle_bounds_.push_back({level, node, index(along), normal > 0.0F ? 1.0F : -1.0F,
@@ -174,7 +177,8 @@ void CompositeGrid::add_obstacle_bounds(std::size_t axis) noexcept {
     const auto set = [&](Level& level, std::size_t number) {
       float& own = level.bound[kind][number];
       own = std::max(own, b.sign * b.u);
-      // If tissue is squeezed to its limits, its links exceed them, and the rigid surface does not give way.
+      // If the two bounds contradict each other, the opposite one gives way, not the rigid surface. Then
+      // links of the squeezed tissue exceed their limits.
       float& opposite = level.bound[1 - kind][number];
       opposite = std::min(opposite, -own);
     };

@@ -25,10 +25,10 @@ struct LevelView {
   const float* f;                      // load (N); null: 0
   const float *lower, *negated_upper;  // least u, least −u; null: no such bounds
   // Written by residual_of_level(). A node is active if it is at its bound and pulled against the bound. It
-  // is free if it may move and is not active. Both arrays hold 1 or 0.
+  // is free if it may move and is not active. is_free and is_active hold 1 or 0.
   float *residual, *is_free, *is_active;
-  // Stiffness of the spring that active nodes of finer levels add to a node; 1 / (diagonal + that stiffness),
-  // null: none.
+  // active_stiffness: of the spring that active nodes of finer levels add to a node. inverse_with_active: 1 /
+  // (diagonal + active_stiffness); null: there are no such springs.
   float *active_stiffness, *inverse_with_active;
   std::array<const float*, 3> weight;  // [d] of the link to the next node along d (unit: link between voxels)
   const float *inverse_diagonal, *diagonal;  // of the stiffness matrix; inverse 0: the node does not move
@@ -42,8 +42,8 @@ struct LevelView {
 // One projected Gauss-Seidel sweep: each node moves to the minimum of its energy within its bounds. Rows are
 // swept in two colours of (j + k), the nodes of a row in two colours of i.
 void smooth_level(const LevelView& view) noexcept;
-// residual = f − K u, with is_free and is_active. The residual is 0 for fixed and for active nodes. Active
-// nodes take no correction from coarser levels either.
+// residual = f − K u. Also sets is_free and is_active. The residual is 0 for fixed and for active nodes.
+// Active nodes take no correction from coarser levels either.
 void residual_of_level(const LevelView& view) noexcept;
 // Sets active_stiffness. To a free node's value it adds a share of the stiffness of the node's links to
 // active nodes. Other nodes get 0.
@@ -101,7 +101,8 @@ void note_at_bound(float* at_bound, const float* u, const float* lower, const fl
 void beyond_bounds(const float* u, const float* lower, const float* negated_upper, float* beyond,
                    std::size_t count) noexcept;
 // Force of links and loads along `mode` (J per unit of the mode) and stiffness along it, summed over the
-// unknowns that are not strictly within the finer patch finer_first … finer_last (none: last < first).
+// unknowns that are not strictly within the finer patch, finer_first … finer_last (last < first: there is no
+// finer patch).
 struct ModeResponse {
   double force = 0.0, stiffness = 0.0;
 };
@@ -110,8 +111,8 @@ ModeResponse mode_response(const LevelView& view, const float* mode, const std::
 // u += by · mode, within the bounds.
 void step_along_mode(float* u, const float* mode, float by, const float* lower, const float* negated_upper,
                      std::size_t count) noexcept;
-// u is `before` plus a correction. If the correction raised the energy, it is shortened to the least energy
-// along it. `before` becomes scratch.
+// u is `before` plus a correction. If more than half of the correction lies beyond the energy minimum along
+// it, the correction is shortened towards that minimum. `before` becomes scratch.
 void shorten_correction(const LevelView& view, float* before) noexcept;
 
 }  // namespace voxel::composite

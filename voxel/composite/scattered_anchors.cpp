@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Anchors on the coarse levels of a CompositeGrid, where they do not fill whole sides of the object. An
-// anchored region holds the nodes around it even if it is smaller than a coarse cell, or if no line of nodes
-// meets it.
+// Anchors that do not fill whole sides of the object, on the coarse levels of a CompositeGrid. An anchored
+// region holds the nodes around it even if it is smaller than a coarse cell, or if no line of nodes meets it.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -20,8 +19,8 @@ constexpr float kLeastResistance = 0.01F;
 
 // Finds the two nodes of an anchor's face. `held`: the node that the face holds; along d it lies in the plane
 // of the anchored voxel or next to it on the tissue's side. `nearest`: the nearest node along d. In the other
-// directions both lie on the line of links whose tissue includes the face's cell. If there is no link at
-// `held`, both are the nearest node with links. `distance`: from the anchored voxel to `held` along d
+// directions both nodes lie on the line of links whose tissue includes the face's cell. If there is no link
+// at `held`, both are the nearest node with links. `distance`: from the anchored voxel to `held` along d
 // (voxels). False if there is no such node.
 bool CompositeGrid::nodes_of_face(const Level& level, const CoarseMaterial::AnchorFace& face,
                                   std::size_t& held, std::size_t& nearest, int& distance) noexcept {
@@ -47,8 +46,8 @@ bool CompositeGrid::nodes_of_face(const Level& level, const CoarseMaterial::Anch
   return true;
 }
 
-// Scattered anchors on a coarse level: each face between an anchored voxel and tissue holds a node. It also
-// cuts its share from the link in which it lies.
+// Scattered anchors on a coarse level: each face between an anchored voxel and tissue holds a node. If the
+// face lies in a link, the link's weight shrinks by the face's share of the area.
 void CompositeGrid::gather_anchors(Level& level) noexcept {
   const int step = level.step;
   Index3 low{}, high{};
@@ -89,7 +88,8 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
       if (weight > 0.0F) level.anchor_weight[d][n] = stiffness_at(level, n) * weight;
     }
   }
-  // A node behind a face has only anchored tissue if no other face holds the node.
+  // A node behind a face has only anchored tissue if no other face holds the node. Such a node gets the
+  // stiffest spring.
   const auto is_held = [&](std::size_t n) {
     return level.anchor_weight[0][n] + level.anchor_weight[1][n] + level.anchor_weight[2][n] > 0.0F;
   };
@@ -116,10 +116,10 @@ float CompositeGrid::constriction_of_face(const Level& level, std::size_t cell) 
   return std::sqrt(faces_of_cell_[cell] / (4.0F * std::numbers::pi_v<float> * part));
 }
 
-// Weight by which N of the s² faces of a cell hold a node. In series with the faces lie the tissue between,
-// and the constriction of the load that spreads from N faces to s². The constriction has the factor (1 −
-// ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² the weight is that of the chain of
-// links.
+// Weight by which N of the s² faces of a cell hold a node. In series with the faces lie the tissue between
+// them and the node, and the constriction of the load that spreads from N faces to s². The constriction has
+// the factor (1 − ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² the weight is that of
+// the chain of links.
 float CompositeGrid::weight_of_faces(const AnchorFaces& faces, std::size_t n, float square) noexcept {
   const float count = faces.count[n];
   if (count == 0.0F) return 0.0F;

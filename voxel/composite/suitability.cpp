@@ -18,8 +18,8 @@ constexpr double kConverges = 0.85;  // largest accepted mean convergence factor
 // Largest accepted error, as a share of the force with patches twice as wide: two just noticeable
 // differences.
 constexpr double kMaxForceError = 0.14;
-// Forces are scaled to a press as deep as this share of the object's smallest side. The relative error of a
-// force below 0.57 N is taken relative to 0.57 N: 7 % of that is 0.04 N, which a hand does not feel.
+// Forces are scaled to a press as deep as this share of the object's smallest side. Errors are relative to
+// the force, or to 0.57 N if the force is smaller: 7 % of 0.57 N is 0.04 N, which a hand does not feel.
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
 
 // The axis direction nearest to the inward normal. For a sheet one voxel thick, which has no such normal: the

@@ -111,8 +111,8 @@ HYBRID_MULTIVERSIONED void prolong_row_by_links(const ProlongArgs& t, const Prol
 HYBRID_MULTIVERSIONED void restrict_row_by_links(const RestrictArgs& g) noexcept {
   for (int o = 0; o < g.vectors; ++o) {
     const int at = o * kLanes;
-    // Share of the row n that the coarse row receives. For the row before (n = 0) the coarse row is the
-    // second of the two coarse rows that it lies between.
+    // Share of fine row n that the coarse row receives. The fine row before the coarse row (n = 0) lies
+    // between two coarse rows, and this one is the second.
     const auto weight_of = [&](float whole, std::size_t n, const std::array<const float*, 2>& links,
                                Float8& w) __attribute__((always_inline)) {
       w = Float8{} + whole;

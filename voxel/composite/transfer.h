@@ -34,11 +34,12 @@ void prolong_row(const ProlongArgs& args) noexcept;
 // Operator interpolation of one fine row, which may lie between coarse rows in y, in z or in both.
 struct ProlongByLinksArgs {
   std::array<const float*, 4> rows;  // coarse rows; [0]: before in y and z; +1: after in y; +2: after in z
-  // Links along x of the fine rows at the same places.
+  // [n] Weights of the links along x of the fine row at the place of rows[n].
   std::array<const float*, 4> link_x;
-  // Links along y before and after the row between them; [0]: at the row before in z, [1]: at the row after.
+  // Weights of the links along y before and after the fine row. [0]: in the plane of rows[0]; [1]: in the
+  // plane after it in z.
   std::array<std::array<const float*, 2>, 2> link_y;
-  std::array<const float*, 2> link_z;  // links along z before and after the row itself
+  std::array<const float*, 2> link_z;  // weights of the links along z before and after it
   bool between_y, between_z;
 };
 void prolong_row_by_links(const ProlongArgs& args, const ProlongByLinksArgs& by) noexcept;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds the cells with boundary springs. Cells of held and sliding voxels are queued. Cells of anchors are
-// found on first use.
+// Finds the cells with boundary springs. Cells near held and sliding voxels are queued. The springs of cells
+// near anchors are found on first use.
 #include "voxel/multigrid/boundary_springs.h"
 
 #include <algorithm>
@@ -116,7 +116,7 @@ std::uint32_t BoundarySprings::voxels_at_anchors(RowId row) const noexcept {
   return lanes & filled;
 }
 
-// Lanes of the cells of a row that contain such voxels.
+// Lanes of the cells of a row that contain voxels_at_anchors().
 std::uint32_t BoundarySprings::cells_at_anchors(int level, RowId row) const noexcept {
   const Grid& finer = at(level - 1).couplings->grid();
   const std::array<int, 3> c = at(level).couplings->grid().row_coordinates(row);

@@ -39,7 +39,8 @@ class BoundarySprings {
   // `levels`: level 0 first; must outlive this. Allocates.
   BoundarySprings(const Lattice& lattice, const std::vector<LevelStiffness*>& levels);
 
-  // Voxels that the tool and other objects hold on all axes; at most as many as there are surface voxels.
+  // Sets the voxels that the tool and other objects hold on all axes; at most as many as there are surface
+  // voxels.
   void set_held(std::span<const VoxelId> held) noexcept;
   // Sets how voxel v is fixed by its obstacle, or by the tool that it slides on; takes effect with renew().
   void support(VoxelId v, const Support& by) noexcept;
@@ -77,8 +78,8 @@ class BoundarySprings {
  private:
   using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links along d (N/m)
   // Springs of anchors are found when their row is first asked for, because all of them would take much
-  // memory. On coarse levels finding them takes long: there they are found on construction and stored without
-  // zeros.
+  // memory. On coarse levels finding them takes long: there they are found on construction and stored as
+  // records, without zeros.
   struct Record {
     VoxelId cell;
     std::uint32_t first;  // index of its first value in Level::values
@@ -89,7 +90,7 @@ class BoundarySprings {
     LevelStiffness* couplings = nullptr;
     std::array<std::array<LazyArray<float>, 3>, 3> through;  // [axis][d][cell]
     std::array<LazyArray<float>, 3> hold, nearer;            // [axis][cell]
-    LazyArray<std::uint8_t> row_held;                        // [row] number of non-zero ratios, and kWaits
+    LazyArray<std::uint8_t> row_held;                        // [row] values of `hold` that are not 0; kWaits
     std::array<LazyArray<float>, 3> tilt;                    // [xy, xz, yz][cell]
     LazyArray<std::uint8_t> row_tilted;  // [row] number of cells with an off-diagonal stiffness
     LazyArray<std::uint8_t> queued;      // [cell] 1: it is queued
@@ -113,7 +114,7 @@ class BoundarySprings {
     if ((!held_.empty() && held_mark_[v] != 0) || lattice_.anchored(v)) return kAll;
     return supports(v / kRow) ? supported_[v] : Support{};
   }
-  // ---- what anchors hold ----
+  // ---- springs of anchors ----
   void wait_for_anchors();
   void keep_records(int level);
   void find_waiting(int level, RowId row) noexcept;
@@ -146,7 +147,7 @@ class BoundarySprings {
   LazyArray<std::uint8_t> held_mark_;         // [voxel]
   LazyArray<Support> supported_;              // [voxel]
   LazyArray<std::uint8_t> row_supported_;     // [row] 1: a voxel of it was ever supported
-  std::array<LazyVector<VoxelId>, 2> queue_;  // cells of a level, and of the next, to be renewed
+  std::array<LazyVector<VoxelId>, 2> queue_;  // cells to be renewed: of one level, of the next
 };
 
 }  // namespace voxel

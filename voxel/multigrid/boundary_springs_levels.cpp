@@ -58,8 +58,8 @@ float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
   return compliance > 0.0F ? 1.0F / compliance : 0.0F;
 }
 
-// Shares of a link's springs, by axis and by pair of axes. These shares resist a voxel with support `own` if
-// the other end has support `other`.
+// Shares of a link's springs that resist the motion of a voxel, by axis and by pair of axes. The voxel has
+// support `own`, the other end of the link has support `other`.
 struct Kept {
   std::array<float, 3> axes, pairs;
 };

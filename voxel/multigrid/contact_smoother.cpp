@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Passes of a cycle at contacts: pressed voxels slide on the tool, voxels at rigid surfaces stay outside of
-// them, and both are boundary springs for the coarse levels.
+// Passes of a cycle at contacts: pressed voxels slide on the tool, and voxels at rigid surfaces stay outside
+// these surfaces. Both give boundary springs to the cells above them.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -75,9 +75,9 @@ float Multigrid::slide_pressed_by(RowId row, const RowVector& way, Displacement&
   return most;
 }
 
-// Moves a row. Voxels that this would take into their obstacles stay while the others move. If such a voxel
-// were put back afterwards, its neighbours would have followed it into the obstacle as far as links allow,
-// and would hold it there.
+// Moves a row. Voxels that would enter their obstacles stay where they are, while the others move. If such a
+// voxel were put back afterwards, its neighbours would have followed it into the obstacle as far as links
+// allow, and would hold it there.
 template <class Move>
 std::uint32_t Multigrid::move_outside(LevelRow r, RowId row, Displacement& state,
                                       const ObstacleView& obstacles, const Move& move) noexcept {
@@ -120,8 +120,8 @@ float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state
 }
 
 // Corrects a row of voxels as far as links and obstacles allow. The part that an obstacle refuses is not
-// subtracted from the cells. A refused voxel slides along the obstacle with its neighbours, and cells that
-// took its part back in every cycle would swing between two states.
+// subtracted from the cells, because the voxel slides along the obstacle with its neighbours. If cells lost
+// that part in every cycle, they would oscillate between two states.
 RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
                                         Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                         RowVector& refused) noexcept {
@@ -140,8 +140,8 @@ RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowV
   return done;
 }
 
-// Takes the force that presses a voxel against its obstacle or the tool out of the residual, because the
-// contact balances it. The cells above the voxel get a boundary spring.
+// A contact balances the force that presses a voxel against its obstacle or the tool. Subtracts this force
+// from the residual. The cells above the voxel get a boundary spring.
 void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                  RowResidual& found, RowVector& out) noexcept {
   const double touching = kTouching * lattice_.min_spacing_m();
@@ -174,8 +174,8 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
 }
 
 // Motion from another solver takes no voxel deeper into its obstacle than it was, except by rounding. If
-// rounding counted as an overlap, the voxel would be projected again next to neighbours that have not moved
-// yet, and the two solvers would disagree more with each exchange.
+// rounding counted as an overlap, the voxel would be projected again, beside neighbours that have not moved
+// yet. Then the two solvers would disagree more with each exchange.
 void Multigrid::add_motion(RowId row, const RowVector& way, Displacement& state,
                            const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;

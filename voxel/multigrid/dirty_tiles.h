@@ -29,8 +29,8 @@ class TileQueue {
 
   [[nodiscard]] std::size_t tiles() const { return waits_.size(); }
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
-  // Call when something moved in this row (Grid::row_coordinates). Queues the row's tile, and the tiles
-  // beside that if the row is at the tile's border.
+  // Call when something moved in this row (Grid::row_coordinates). Queues the row's tile and the tiles beside
+  // it in x. If the row is at the tile's border in y or z, the tile beyond that border is queued, too.
   void mark_dirty(const std::array<int, 3>& row) noexcept {
     const int column = row[0] - 1, j = row[1], k = row[2];
     push(column, j, k);

@@ -12,15 +12,15 @@ namespace voxel {
 namespace {
 
 constexpr int kMaxLevels = 10;
-constexpr int kSmallest = 3;  // most cells along an axis of the coarsest level
-// From this level on springs are written on construction.
+constexpr int kSmallest = 3;  // greatest number of cells along an axis of the coarsest level
+// The springs of this level and of coarser ones are found on construction.
 constexpr int kWrittenAtOnce = 5;
-// Most rows with a frozen residual; the contact of a tool has some hundred.
+// Greatest number of rows with a frozen residual. The contact of a tool has some hundred.
 constexpr std::size_t kMaxFrozen = 4096;
-// Most rows that a tick adds in one batch.
+// Greatest number of rows that a tick adds in one batch.
 constexpr std::size_t kMostInTick = 1024;
 constexpr std::uint8_t kAllAxes = 7;
-// Most active limits on all levels together. Voxels and cells beyond that number still move.
+// Greatest number of active limits, summed over all levels. Voxels and cells beyond that number still move.
 constexpr std::size_t kMaxStopped = 65536;
 
 }  // namespace
@@ -46,7 +46,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
     level.stopped = LazyArray<std::uint8_t>(g.size());
     level.flags = LazyArray<std::uint8_t>(g.rows());
     levels_.push_back(std::move(level));
-    // There is at least one coarse level, because residuals are measured on the way to it.
+    // There is at least one coarse level, because residuals are measured when they are restricted to it.
     if (levels() > 1 && *std::max_element(g.dims.begin(), g.dims.end()) <= kSmallest) break;
   }
   for (int l = kWrittenAtOnce; l < levels(); ++l) prepare_level(l);
@@ -64,7 +64,7 @@ Multigrid::Multigrid(const Lattice& lattice) : lattice_(lattice), tiles_(lattice
   block_state_.resize(blocks_->count());
   for (BlockState& p : block_state_) p.on.resize(levels_.size());
   block_bounds_.reserve(kMaxBlockBounds);
-  // Cells of blocks are stopped for the row passes; blocks move by themselves.
+  // Row passes must not move the cells of blocks, because a block moves as one. So these cells are stopped.
   for (int l = 1; l < levels(); ++l) {
     for (std::size_t p = 0; p < blocks_->count(); ++p) {
       for (const RigidBlocks::Run& run : blocks_->on(l, p).rows) {
@@ -114,9 +114,9 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
   if (level == 0 && (flags & active) != 0) tiles_.mark_dirty(g.row_coordinates(row));
 }
 
-// Notes that a row moved by `change`. A change too small for a sweep is still restricted, because small
-// forces on many voxels add up to a large one on the cell above. That force is four times as large on each
-// coarser level.
+// Notes that a row moved by `change` (m). A change too small for a sweep is still restricted, because small
+// forces on many voxels add up to a large one on the cell above. From each level to the next this force grows
+// by a factor of four.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
   if (change <= restricted_m()) return;
   if (level == 0) bricks_.look_at(row);
@@ -181,7 +181,7 @@ void Multigrid::release_inactive(const Displacement& state) noexcept {
       if ((at(0).stopped[s.cell] & bit) != 0 && pulled_against_limit(s.cell, axis)) bits |= bit;
     }
     if (bits == 0) continue;
-    // A voxel is listed once for each time that axes were added; the first entry has all.
+    // A voxel may be listed more than once. Its first entry takes all its axes.
     at(0).stopped[s.cell] = 0;
     still_stopped_.push_back({s.cell, bits});
   }

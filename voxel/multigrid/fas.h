@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The passes of a multigrid cycle, row by row. Relaxation decides which rows, and when.
+// The passes of a multigrid cycle, row by row. Relaxation decides which rows they visit, and when.
 //
 // Full approximation scheme (FAS; Brandt 1977; Briggs, Henson & McCormick, A Multigrid Tutorial, chapter 6):
 // a coarse cell holds a displacement, not a correction. So a tick can solve the neighbourhood of the contact
-// on all levels while fine voxels further away are still where they were: the coarse cells there move on, and
-// their corrections are prolonged later. A correction that a cell has still to prolong is *pending*.
+// on all levels. Further away it moves only the coarse cells, and later ticks prolong their corrections to
+// the voxels. A correction that is not prolonged yet is *pending*.
 #pragma once
 
 #include <array>
@@ -70,20 +70,20 @@ class Multigrid {
   [[nodiscard]] BrickLoads& bricks() { return bricks_; }
   [[nodiscard]] const BrickLoads& bricks() const { return bricks_; }
 
-  // Voxels that the tool and other objects hold: they do not move, and are boundary springs of the cells
-  // above them.
+  // Sets the voxels that the tool and other objects hold. They do not move, and the cells above them get
+  // boundary springs.
   void set_held(std::span<const VoxelId> held) noexcept { boundary_springs_->set_held(held); }
   // Renews the boundary springs of voxels that slide on the tool or on obstacles, as found by the last
   // residuals.
   void renew_boundary_springs() noexcept { boundary_springs_->renew(); }
   // Factor for the boundary springs of held voxels; raised after a cycle that overshot.
   void set_boundary_scale(float times) noexcept { boundary_scale_ = times; }
-  // Releases all limits that are active, and the cells above them.
+  // Releases all active limits. The voxels and cells that they held may move again.
   void release_active() noexcept;
   // Releases the active limits that no voxel pulls against any more.
   void release_inactive(const Displacement& state) noexcept;
-  // If set, residuals against active limits are restricted, too. This is for tissue that a wave has just
-  // brought to its limits, and that has to leave them all together.
+  // If set, forces against active limits are restricted, too. This is for tissue that a wave has just brought
+  // to its limits: its voxels have to leave the limits together.
   void restrict_all(bool all) noexcept { restricts_all_ = all; }
   // Sets the force of active limits on a voxel (N), until it is set again. The force balances that of the
   // springs, and the cells above the voxel do not move.
@@ -120,9 +120,9 @@ class Multigrid {
   // Restricts values: the value of a coarse cell becomes the mean of its children plus its pending
   // correction.
   void restrict_values(int level, RowId row, Displacement& state, LaneSpan span = {}) noexcept;
-  // Restricts loads: a coarse cell gets the load under which its children would be at rest where they are.
-  // Returns the largest residual on the finer level (N); for level 1 it is one of voxels. If the span is the
-  // whole row, it also finds which finer rows are at rest.
+  // Restricts loads. The load of a coarse cell makes its residual, at its prolonged value, the sum of its
+  // children's residuals. Returns the largest residual on the finer level (N); for level 1 that is the level
+  // of voxels. If the span is the whole row, it also finds which finer rows are at rest.
   float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        LaneSpan span = {}) noexcept;
   // Prolongs pending corrections of coarse rows marked `source` to the rows of a box (see prolongation.h),
@@ -149,7 +149,7 @@ class Multigrid {
   // `motion_tolerance_m`.
   [[nodiscard]] float motion_tolerance_m() const { return motion_tolerance_m_; }
   [[nodiscard]] float tolerance_N() const { return tolerance_N_; }
-  // Smaller changes are neither restricted nor prolonged (m).
+  // Changes smaller than this (m) are neither restricted nor prolonged.
   [[nodiscard]] float restricted_m() const { return motion_tolerance_m_ / 32.0F; }
   void set_motion_tolerance(float tolerance_N, float motion_tolerance_m) noexcept {
     tolerance_N_ = tolerance_N;
@@ -161,7 +161,8 @@ class Multigrid {
   // ---- rigid blocks (rigid_blocks.h, rigid_block_passes.cpp); numbers begin with 0 ----
   [[nodiscard]] bool has_blocks() const { return blocks_ != nullptr; }
   [[nodiscard]] const RigidBlocks& blocks() const { return *blocks_; }
-  // Sets which pressed voxels of blocks the tool holds along its normals, until the next call.
+  // `held`: voxels that the tool holds. Until the next call, a block with such voxels cannot move along the
+  // tool's normals at these voxels.
   void set_block_contacts(const Displacement& state, std::span<const VoxelId> held) noexcept;
   [[nodiscard]] bool tool_presses_block(std::size_t block) const {
     return block_state_[block].by_tool.count > 0;
@@ -191,8 +192,8 @@ class Multigrid {
                      const ObstacleView& obstacles) noexcept;
   // measure_blocks() finds the residuals of the blocks; call it before the coarser level's loads are
   // restricted. load_blocks() finds the blocks' own loads on the coarser level; call it afterwards. For level
-  // 0, measure_blocks() returns the largest residual of a block, divided by the root of its number of border
-  // links (N).
+  // 0, measure_blocks() returns the largest residual of a block, divided by the square root of its number of
+  // border links (N).
   float measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                        const ObstacleView& obstacles) noexcept;
   void load_blocks(int level, const RigidBlocks::Box& box) noexcept;
@@ -200,7 +201,7 @@ class Multigrid {
   void freeze_blocks(const Displacement& state) noexcept;
 
   // ---- asynchronous relaxation: two Multigrid of one lattice work in turns (shadow_object.h) ----
-  // From now on written rows are logged. Allocates.
+  // Starts the log of written rows. Allocates.
   void keep_log();
   [[nodiscard]] ChangeLog& log() { return log_; }
   // Drops all coarse cells. From then on only the shadow renews the loads of bricks. Allocates.
@@ -208,7 +209,7 @@ class Multigrid {
   // Sets coarse cells of logged rows to 0.
   void drop_coarse() noexcept;
   [[nodiscard]] std::size_t rows_to_drop() const noexcept;
-  // As drop_coarse(). Afterwards no residual is frozen any more.
+  // Calls drop_coarse(). Afterwards no residual is frozen.
   void restart() noexcept;
   // Freezes the residual of a row: its voxels count as at rest where they are.
   void freeze_residual(RowId row, Displacement& state, const ObstacleView& obstacles,
@@ -232,8 +233,9 @@ class Multigrid {
   // Adds motion that another solver found to a row, as far as its links allow.
   void add_motion(RowId row, const RowVector& way, Displacement& state,
                   const ObstacleView& obstacles) noexcept;
-  // The same for many rows together: each goes as far as its links to the others' new places allow. Add each
-  // row once. If can_batch() is false (obstacles nearby, or too many rows), use add_motion().
+  // A batch adds motion to many rows together. Each row moves as far as its links to the new places of the
+  // other rows allow. Add each row once. If can_batch() is false (obstacles nearby, or too many rows), use
+  // add_motion().
   [[nodiscard]] bool can_batch(RowId row, const Displacement& state) noexcept {
     return prepare(0, row) && state.row_obstacles[row] == 0 && !limited_correction_.full();
   }
@@ -245,8 +247,8 @@ class Multigrid {
     set_out(r, state);
   }
   void move_batch(Displacement& state) noexcept { apply_limited_correction(state); }
-  // True if the row was added. Then `left` is the rest of its motion (m), and `gone` tells whether nothing is
-  // left.
+  // True if the row was added. Then `left` is the part of its motion that it has not made (m), and `gone`
+  // tells whether it has made all of its motion.
   [[nodiscard]] bool batched(RowId row, const Displacement& state, RowVector& left,
                              bool& gone) const noexcept {
     const LimitedCorrection::Row* r = limited_correction_.find(row);
@@ -256,7 +258,7 @@ class Multigrid {
   void clear_batch() noexcept { limited_correction_.clear(); }
   // Finds all springs and takes all memory now, not when a tick first needs them.
   void prepare_all() noexcept;
-  void prepare_limit_loads() noexcept;  // memory that set_limit_load() writes to
+  void prepare_limit_loads() noexcept;  // takes the memory that set_limit_load() writes to
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -264,7 +266,7 @@ class Multigrid {
     std::unique_ptr<LevelStiffness> couplings;
     // [axis][cell] of coarse levels. `prolonged` is the part of the value that the finer level knows, so
     // value − prolonged is the pending correction. `loaded_at` is the value of `prolonged` when the load was
-    // found. Boundary springs pull towards it.
+    // found. Boundary springs pull towards `loaded_at`.
     std::array<LazyArray<float>, 3> value, prolonged, load, loaded_at;
     LazyArray<std::uint8_t> stopped;  // [cell or voxel] bits 0 to 2: an active limit holds it on that axis
     LazyArray<std::uint8_t> flags;    // [row]
@@ -384,7 +386,8 @@ class Multigrid {
   std::array<LazyArray<float>, 3> limit_load_;   // [axis][v] (N)
   LazyArray<std::uint16_t> row_has_limit_load_;  // [row] number of voxels with a limit load
   LimitedCorrection limited_correction_;
-  // Rows with a frozen residual, and their loads (N) side by side, so that freezing touches few pages.
+  // Rows with a frozen residual, and their loads (N). The loads are contiguous, so that freezing touches few
+  // pages of memory.
   LazyVector<RowId> frozen_rows_;
   LazyArray<float> frozen_residual_;        // [index into frozen_rows_][axis][lane]
   LazyArray<std::uint16_t> frozen_number_;  // [row] 1 + index; 0: not frozen

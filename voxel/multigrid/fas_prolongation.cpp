@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The way back to fine levels: coarse corrections are prolonged trilinearly and applied within the limits.
+// Prolongation: coarse corrections are interpolated trilinearly and applied within the limits of links.
 #include <algorithm>
 
 #include "voxel/lattice/prefetch.h"
@@ -64,7 +64,7 @@ void Multigrid::interpolate_row(int level, int j, int k, const ProlongedBox& box
   bool is_source = false, whole = true;
   const int before = prolongation_.first() - 1, after = prolongation_.first() + prolongation_.groups();
   for (int q = before; q <= after; ++q) {
-    const int column = (q + kLaneGroups) / kLaneGroups;  // including the empty one before the first
+    const int column = (q + kLaneGroups) / kLaneGroups;  // column 0 is the empty one before the first
     const RowId row = g.row(column, j, k);
     is_source = is_source || (q > before && q < after && has(level, row, source));
     whole = whole && l.couplings->prepare(row) && l.couplings->uniform(row);
@@ -161,7 +161,7 @@ void Multigrid::prolong(int level, const ProlongedBox& box, Displacement& state,
 
 // Prefetches the values that a correction is added to: no cache has them.
 void Multigrid::fetch(int level, RowId row, const Displacement& state) const noexcept {
-  if (blocks_ != nullptr && blocks_->fill_known_row(level, row)) return;  // not visited row by row
+  if (blocks_ != nullptr && blocks_->fill_known_row(level, row)) return;  // corrected as wholes
   for (const auto& axis : level == 0 ? state.u : at(level).value)
     prefetch_range(axis.data() + static_cast<std::size_t>(row) * kRow, kRow * sizeof(float));
 }
@@ -188,7 +188,7 @@ void Multigrid::prolong_row(int level, RowId row, const std::array<ProlongedRow,
   log_.note(level, row);
   if (blocks_ != nullptr && blocks_->in_row(level, row)) note_prolonged_blocks(level, row, span, correction);
   if (together != nullptr) {
-    // if all rows move together, none is in the way of a row that moves alone
+    // Without obstacles all rows move together. So this row can move now: it blocks no row that moves alone.
     if (obstacles.obstacles.empty()) set_out(*together, state);
     return;
   }

@@ -5,9 +5,9 @@
 // If rows moved one after another, links to rows that have not moved yet would stop them, and voxels that
 // active limits tie together would not move. So all rows move first. Then voxels with a link beyond its limit
 // come back towards their start until no link is violated. At the start no link was violated. So one end of a
-// violated link can always come nearer to its start, and no voxel turns round. Difference constraints are
-// closed under minimum and maximum. So if all voxels on an axis move the same way, they come back by the
-// least amount, whatever the order.
+// violated link can always come nearer to its start, and no voxel has to move away from its start on the way
+// back. States that satisfy difference constraints are closed under minimum and maximum. So if all voxels on
+// an axis move the same way, they come back by the least amount, whatever the order.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace voxel {
 
 class LimitedCorrection {
  public:
-  static constexpr std::size_t kMost = 65536;  // most rows at a time
+  static constexpr std::size_t kMost = 65536;  // greatest number of rows at a time
 
   struct Row {
     RowId row = 0;
@@ -34,7 +34,7 @@ class LimitedCorrection {
     bool out = false;     // it has moved
     bool cut = false;     // voxels that do not move were asked to move
     bool aims = false;    // its target is stored, because the row may miss it
-    RowVector from;       // where it was; before it has moved, its motion (m)
+    RowVector from;       // before it moves: its motion (m); afterwards: where it was (m)
   };
 
   LimitedCorrection() = default;

@@ -9,14 +9,14 @@
 namespace voxel {
 namespace {
 
-// Largest mean number of visits per row. More occur only if rounding drives a row back and forth. Then all
-// rows return to their start.
+// Largest mean number of visits per row. More visits occur only if rounding drives a row back and forth. Then
+// all rows return to their start.
 constexpr std::size_t kMostVisits = 64;
 
 }  // namespace
 
 // Moves a row by the motion in `from`. Held and anchored voxels stay. Pressed voxels move along the tool's
-// tangent plane. A voxel that an active limit stops stays, and its motion becomes a target. If a limit cuts
+// tangent plane. A voxel that an active limit holds does not move, but its target is stored. If a limit cuts
 // one axis of a sliding voxel's motion, the voxel leaves the tool or enters it by a little, until the next
 // projection.
 void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept {
@@ -79,7 +79,7 @@ void Multigrid::stay(Displacement& state) noexcept {
   }
 }
 
-// in the order of Side
+// Rows beside a row, in the order of Side.
 std::array<RowId, 6> Multigrid::beside(RowId row) const noexcept {
   const Grid& g = grid(0);
   return {row - 1, row + 1, row - g.row_z, row + g.row_z, row - g.row_x, row + g.row_x};
@@ -90,7 +90,7 @@ void Multigrid::ask_round(RowId row) noexcept {
   for (const RowId to : beside(row)) limited_correction_.ask(to);
 }
 
-// A row that does not move may hold this row back, too.
+// Queues a row if its links to rows outside the correction may be beyond their limits.
 void Multigrid::look_at_others(const LimitedCorrection::Row& r, Displacement& state) noexcept {
   unsigned sides = 0, side = 1;
   for (const RowId to : beside(r.row)) {

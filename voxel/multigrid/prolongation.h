@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Prolongation buffer: two planes of coarse corrections, already interpolated along x.
 //
-// Corrections are prolonged trilinearly. Sixteen finer rows need each row of cells, so a row of cells is read
+// Corrections are prolonged trilinearly. Each row of cells contributes to sixteen finer rows. So it is read
 // and interpolated along x only once.
 #pragma once
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid blocks on coarse levels: their loads are restricted as one sum, and corrections move each as one.
+// Rigid blocks on coarse levels: the load of a block is restricted as one sum, and a correction moves a block
+// as one.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -13,9 +14,9 @@
 
 namespace voxel {
 
-// Sets the residual that the cells of blocks in a row restrict. It is 0 for a block that the coarser level
-// knows, because that level gets the block's residual as a whole. It is 0 for a block that sprawls. For other
-// blocks it is an equal share for each cell.
+// Sets the residual that is restricted from the cells of blocks in a row. It is 0 for a block that the
+// coarser level knows, because that level gets the block's residual as a whole. It is 0 for a block that
+// sprawls. For other blocks it is an equal share for each cell.
 void Multigrid::set_block_lanes(int level, RowId row, LaneSpan span, RowVector& out) const noexcept {
   for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = blocks_->of(level, row * kRow + static_cast<VoxelId>(i));
@@ -31,7 +32,8 @@ void Multigrid::set_block_lanes(int level, RowId row, LaneSpan span, RowVector& 
   }
 }
 
-// Restricts the residual of other tissue in a block's cells to the block on the coarse level.
+// A coarse cell of a block may contain other tissue. Adds the residual of that tissue to the block's
+// residual.
 void Multigrid::restrict_block_lanes(int level, RowId row, LaneSpan span, const RowVector& sums) noexcept {
   for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = blocks_->of(level, row * kRow + static_cast<VoxelId>(i));
@@ -83,7 +85,7 @@ void Multigrid::prolong_to_blocks(int level, Displacement& state, const Obstacle
     on.sum = glm::dvec3(0.0);
     if (above.count > 0 && way != glm::dvec3(0.0)) {
       from.pending_correction = glm::dvec3(0.0);
-      // now all its cells have prolonged, in the box or not
+      // all its cells count as prolonged, inside and outside the box
       for (const RigidBlocks::Run& run : above.rows) {
         for (std::size_t axis = 0; axis < 3; ++axis)
           for_cells(run, [&](VoxelId cell, std::uint32_t) {

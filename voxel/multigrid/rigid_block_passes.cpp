@@ -17,7 +17,7 @@ namespace {
 constexpr double kRounding = 1.2e-7;   // last bit of a float, relative
 constexpr double kNearObstacle = 2.0;  // (unit: spacing) obstacles further away are skipped
 constexpr std::uint32_t kAllLanes = ~std::uint32_t{0};
-// How far the voxel of a block at a link's end may move on an axis before the link stops it: {down, up}.
+// How far the voxel of a block at a link's end may move on an axis before the link stops it: {down, up} (m).
 std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state, const RigidBlocks::Link& l,
                               int axis) {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
@@ -85,7 +85,8 @@ glm::dvec3 Multigrid::block_force(std::size_t block, const Displacement& state) 
   return force;
 }
 
-// Interval that all links of the border leave the block. `room(link, axis)` gives {down, up} for one link.
+// Interval in which all links of the border let the block move. `room(link, axis)` gives {down, up} for one
+// link.
 template <class Room>
 Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t block, const Room& room) const noexcept {
   constexpr double kUnlimited = 1e30;
@@ -154,8 +155,8 @@ void Multigrid::stop_at_obstacles(std::size_t block, const Displacement& state, 
   }
 }
 
-// As interval_of_block(), but voxels beside the block come along as far as their other links allow. This is
-// searched in the direction of `way` only.
+// Interval in which the block can move if voxels beside it come along, as far as their other links allow.
+// These voxels extend the interval only in the direction of `way`.
 Multigrid::AdmissibleInterval Multigrid::room_with_others(std::size_t block, const glm::dvec3& way,
                                                           const Displacement& state) const noexcept {
   const auto number = static_cast<std::uint16_t>(block + 1);
@@ -252,7 +253,7 @@ void Multigrid::shift_cells(int level, std::size_t block, const glm::dvec3& way)
 }
 
 // Force and stiffness of a block on a level: springs of its border, boundary springs of its cells, its load.
-// On level 0 the force is only the load that freezes the block's residual.
+// On level 0 the returned force is only the load that freezes the block's residual.
 glm::dvec3 Multigrid::block_pull(int level, std::size_t block, glm::dvec3& stiffness) noexcept {
   const RigidBlocks::OnLevel& on = blocks_->on(level, block);
   stiffness = on.stiffness;
@@ -266,8 +267,8 @@ glm::dvec3 Multigrid::block_pull(int level, std::size_t block, glm::dvec3& stiff
           along(link.spring, axis, link.d) * static_cast<double>(value[link.beside] - value[link.cell]);
     }
   }
-  // If the tool or an obstacle holds the block, its cells have boundary springs for that reason. These
-  // springs would hold the block along the surface, too.
+  // If the tool or an obstacle holds the block, its cells have boundary springs because of that. These
+  // springs would also hold the block along the surface, so they are left out.
   if (block_state_[block].held.count > 0 || blocks_->sprawls(block)) return pull;
   for (const RigidBlocks::Run& run : on.rows) {
     if (!boundary_springs_->any(level, run.row) || !prepare(level, run.row)) continue;
@@ -336,7 +337,8 @@ float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displace
         if (b.force_N > 0.0 && !b.both && b.room_m < kTouching * lattice_.min_spacing_m())
           block.held.add(b.normal);
       }
-      // An active limit balances its force, too; coarse levels would push against it in vain.
+      // An active limit balances the force against it, too. Coarse levels would push against the limit in
+      // vain.
       block.stopped = add_what_comes_along(p, state, pull);
     }
     for (int axis = 0; axis < 3; ++axis) {

@@ -12,9 +12,9 @@ namespace {
 
 constexpr int kMostRounds = 200;
 constexpr double kSettled = 1e-9;  // (unit: largest force of a bound) a smaller change ends the ascent
-// A level knows a block if at least this share of the block's voxels lies in cells of which the block is at
-// least half. Otherwise that level and all coarser ones do not know it: there the force of the whole block
-// would act on the springs of a few cells, and the block would move much too far.
+// A level knows a block if at least this share of the block's voxels lies in cells in which the block has at
+// least half of the voxels. With a smaller share, the force of the whole block would act on the springs of a
+// few cells and move the block much too far. So that level and all coarser ones do not know the block.
 constexpr double kMostOf = 0.7;
 constexpr int kCompact = 1;  // largest distance between cells of a compact block on an axis (unit: cell)
 constexpr double kParallel = 1e-4;  // sin² of the angle below which a direction counts as already fixed
@@ -138,7 +138,7 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
       all += s.voxels;
       if (2 * s.voxels >= filled[s.cell] && l.number[s.cell] == 0) known += s.voxels;
     }
-    if (of.empty()) continue;  // unknown since a finer level
+    if (of.empty()) continue;  // a finer level does not know it
     if (kMostOf * static_cast<double>(all) > static_cast<double>(known)) {
       sprawls_[p] = compact(grid, of) ? 0 : 1;
       of.clear();
@@ -156,7 +156,7 @@ void RigidBlocks::find_cells(int level, std::vector<std::vector<Share>>& shares,
   }
 }
 
-// True if the cells of a block are so few that all of them move nearly alike.
+// True if a block lies in at most two cells along each axis. Such cells move nearly alike.
 bool RigidBlocks::compact(const Grid& grid, const std::vector<Share>& shares) {
   std::array<int, 3> low{}, high{};
   for (const Share& s : shares) {

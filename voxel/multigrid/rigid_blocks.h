@@ -5,14 +5,14 @@
 // Such a component can only be displaced as a whole: it has three unknowns, however many voxels it has. It
 // would never move if its voxels moved one at a time. So its voxels do not move when rows are relaxed, and
 // the block moves, as one, to the equilibrium of its border's springs. On a coarse level a block consists of
-// the cells of which it is at least half. These move as one, too, and their correction is prolonged as that
-// of any other cells.
+// the cells in which it has at least half of the voxels. These cells move as one, too. Their correction is
+// prolonged like that of other cells.
 //
 // A block that has too few voxels in such cells is unknown to that level and to all coarser ones. It takes
-// the mean of the corrections prolonged to its voxels. That is right if the block lies in at most two cells
-// of that level along each axis. A block that sprawls further (a thin sheet, a scaffold) connects tissue that
-// such levels take for separate. They do not move it, and it is fixed for the cells around it
-// (boundary_springs.h).
+// the mean of the corrections prolonged to its voxels. This is accurate if the block lies in at most two
+// cells of that level along each axis. A block that sprawls further (a thin sheet, a scaffold) connects
+// tissue that these levels treat as separate. So they do not move the block, and for the cells around it the
+// block is fixed (boundary_springs.h).
 #pragma once
 
 #include <array>
@@ -98,13 +98,15 @@ class RigidBlocks {
   [[nodiscard]] bool fill_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] >= kFilled;
   }
-  // The same, and the next level knows all of these blocks, so that it restricts and prolongs them as wholes.
+  // Does the row hold nothing but blocks that the next coarser level knows? Such blocks are restricted and
+  // corrected as wholes, not row by row.
   [[nodiscard]] bool fill_known_row(int level, RowId row) const {
     return levels_[static_cast<std::size_t>(level)].row[row] == kFilledKnown;
   }
   // Is the block fixed for coarse levels that do not know it?
   [[nodiscard]] bool sprawls(std::size_t block) const { return sprawls_[block] != 0; }
-  // Voxels of the block with loads besides their springs: from bricks or plastic links of tissue beside it.
+  // Voxels of the block that may have a load beside their springs: one of bricks or plastic links of the
+  // tissue beside the block.
   [[nodiscard]] const std::vector<VoxelId>& loaded(std::size_t block) const { return loaded_[block]; }
   // Surface numbers of its surface voxels.
   [[nodiscard]] const std::vector<std::uint32_t>& surface(std::size_t block) const { return surface_[block]; }

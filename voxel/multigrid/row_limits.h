@@ -31,7 +31,7 @@ constexpr bool clamps(Limits l) {
 struct AxisBounds {
   AxisLimits row;
   std::array<const float*, 3> up_low{}, up_high{}, down_low{}, down_high{};
-  std::array<float, 3> sign{};  // factor of low: −1 across, where the lower limit is the upper one negated
+  std::array<float, 3> sign{};  // factor of …_low: −1 across, where it holds the upper limit
 
   AxisBounds(const RowLimits& limits, std::size_t axis) : row((*limits.of)[axis]) {
     if (limits.lanes == nullptr) return;
@@ -94,8 +94,8 @@ HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& 
   take_least(wanted, in.high);
   wanted = in.low > in.high ? now : wanted;
 }
-// [d] Bound of the difference across a link, a little below the tightest limit of the row. Below it the
-// limits of the link need no check.
+// [d] The limits of a link need no check if its difference is smaller in size than this: a little less than
+// the tightest limit of the row.
 struct Band {
   std::array<float, 3> most;
 
@@ -164,7 +164,7 @@ HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x
   }
 }
 
-// As look_beyond(), if each lane has its own limits.
+// look_beyond() for lanes with limits of their own.
 HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Float8& x_down,
                                      const Float8& x_up, const LevelRow& row, const RowLimits::Written& w,
                                      std::size_t axis, int group) {
@@ -190,8 +190,8 @@ HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Flo
 }
 
 // How links are compared with limits. `tightest`: all with the tightest limits; missing neighbours count as
-// neighbours at rest, so that no spring is read. `linked`: the same, but only where there is a link. `lanes`:
-// each link with its own limits.
+// neighbours at rest, so that no spring is read. `linked`: those that exist, with the tightest limits.
+// `lanes`: each link with its own limits.
 enum class Beyond : std::uint8_t { tightest, linked, lanes };
 
 // Marks the lanes that have a link beyond these limits, by axis. True if there is any.

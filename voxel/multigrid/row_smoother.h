@@ -51,8 +51,8 @@ RowResidual residual_row(const LevelRow& row, const RowLimits* limits, float tig
 void measure_row(const RowStiffness& springs, const RowVector& residual, LaneSpan span,
                  RowResidual& out) noexcept;
 
-// Adds each pair of lanes of a finer row to the lane above it, on one axis. `half` is half of the coarse row;
-// its Float8 span.first/2 is the first to change.
+// Adds each pair of lanes of a finer row to the lane above it, on one axis. `half`: the half of the coarse
+// row that lies above the finer row. Its first Float8 to change is number span.first / 2.
 void add_pairs(const float* fine, LaneSpan span, float* half) noexcept;
 
 // Sets `prolonged` to the means of the children, whose sums are given. `value` keeps its pending correction.
@@ -91,10 +91,11 @@ float row_difference(const float* a, const float* b, LaneSpan span, int first, i
 // way = now − was of one axis of a row; returns the largest |way|.
 float row_way(const float* now, const float* was, float* way) noexcept;
 
-// Links of a row of voxels that are at their limits on one axis, and the voxels' loads. The bits of a mask
-// are lanes.
+// For one axis of a row of voxels: the links that are at their limits, and the forces on the voxels. The bits
+// of a mask are lanes.
 struct LinksAtLimits {
-  // [d] links up, and links down, whose difference is at its lower limit, or at its upper limit
+  // [d] lanes whose link up along d has its difference at the lower limit (at_low) or at the upper limit
+  // (at_high); down_…: likewise the link down
   std::array<std::uint32_t, 3> at_low, at_high, down_at_low, down_at_high;
   std::uint32_t pulled_up, pulled_down;
   std::uint32_t movable;  // not anchored
@@ -108,8 +109,8 @@ struct RowCorrection {
   float most_m = 0.0F;   // largest motion asked of a voxel
   unsigned refused = 0;  // bits of the axes on which some voxel did not follow all the way
 };
-// Adds a correction to a row as far as its links allow. `refused`, for axes whose bit is set: the rest of the
-// correction in the lanes of the span; 0 for held and anchored voxels.
+// Adds a correction to a row as far as its links allow. On axes whose bit is set in the result, `refused`
+// becomes the rest of the correction in the lanes of the span; it is 0 for held and anchored voxels.
 RowCorrection correct_row(const LevelRow& row, const RowLimits* limits, LaneSpan span,
                           const RowVector& correction, RowVector& refused) noexcept;
 
@@ -124,8 +125,9 @@ struct SetOut {
   // bits of the axes on which an active limit (row.stopped) holds a voxel that was asked to move
   unsigned stopped = 0;
 };
-// Adds `way` to a row regardless of its links; held, anchored and stopped voxels stay. `way` then holds where
-// the row was. If any voxel is stopped, `refused` is the motion of stopped voxels in the lanes of the span.
+// Adds `way` to a row regardless of its links; held, anchored and stopped voxels stay. On return `way` holds
+// the displacements before that. If any voxel is stopped, `refused` is the motion of stopped voxels in the
+// lanes of the span.
 SetOut set_out_row(const LevelRow& row, const RowLimits& limits, LaneSpan span, unsigned sides,
                    RowVector& way, RowVector& refused) noexcept;
 // May links in a row, or to one of its sides, be beyond their limits?

@@ -68,7 +68,7 @@ HYBRID_INLINE void standing(Mask8& stands, const LevelRow& row, const Float8& in
     stands |= bits;
   }
 }
-// The same for one axis, read from bits.
+// Lanes that are anchored or held, for one axis. Anchored lanes are read from bits.
 HYBRID_INLINE void standing_by_bits(Mask8& stands, const LevelRow& row, std::size_t axis, int group) {
   bits_set(stands, row.springs.stands + group * kLanes, 1 << axis);
   if (row.held != nullptr) {
