@@ -80,9 +80,10 @@ struct Displacement {
     }
   }
 
-  std::array<LazyArray<float>, 3> u;                    // [axis][v] (unit: meter)
-  LazyArray<std::uint8_t> role;                         // [v]
-  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row] voxels that stand; voxels at obstacles
+  std::array<LazyArray<float>, 3> u;  // [axis][v] (unit: meter)
+  LazyArray<std::uint8_t> role;       // [v]
+  LazyArray<std::uint8_t> row_standing,
+      row_obstacles;                 // [row] number of voxels with stands(role), with at_obstacle(role)
   LazyArray<glm::vec3> tool_normal;  // [surface number] unit, out of the tool; for pressed voxels
   PlasticOffsets plastic;
   BrickLoad bricks;
@@ -125,7 +126,8 @@ struct Displacement {
 // A voxel touches its obstacle if it is no deeper in the obstacle than this share of the smallest spacing.
 inline constexpr double kTouching = 1e-6;
 
-// A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.
+// A half-space that one surface voxel may not leave: normal · u >= bound, where u is the voxel's
+// displacement.
 struct Obstacle {
   glm::vec3 normal{0.0F};
   float bound = 0.0F;  // (m); <= 0 if the voxel at rest is outside the obstacle

@@ -71,9 +71,9 @@ struct LinkModuli {
   return b.along_Pa < a.along_Pa ? b : a;
 }
 
-// Moduli of a link where materials meet, as a sum of two parts. `links[n]` has the moduli of parallel n: of
-// the softer of its two ends, 0 if an end is missing. In one material the sum is the material's moduli times
-// link_weight.
+// Moduli of a link where materials meet, as a sum of two parts. `links[n]` contains the moduli of the softer
+// of the two ends of parallel n; 0 if an end is missing. In one material the sum is the material's moduli
+// times link_weight.
 struct LinkParts {
   // Mean of the four quarters; a quarter has the moduli of the softest voxel of its cell. A rule by the
   // link's two ends in series would ignore the voxels beside the link.

@@ -50,7 +50,7 @@ std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& st
                                   const VoxelSprings& springs, VoxelId v) noexcept;
 
 struct RowPlasticity {
-  float moved_m = 0.0F;      // largest motion of a voxel of the row by the change of its load
+  float moved_m = 0.0F;      // largest motion of a voxel of the row that the change of the loads causes
   bool uncommitted = false;  // some link is beyond its yield, and its offset has not moved
 };
 

@@ -28,9 +28,9 @@ struct PlasticLink {
 
 // `difference` = u(b) − u(a) on one axis, `offset` its rest value so far, `yield` >= 0 the yield strain times
 // the link's length, infinite if the link never yields (all in m). The new offset lies between the old offset
-// and the difference. Limits of the chain count from the first rest length. So if the old offset and the
-// difference keep the limits, the unloaded link does too. Without strain beyond yield, the offset keeps every
-// bit.
+// and the difference. The chain's limits are relative to the initial rest length. So if the old offset and
+// the difference keep the limits, the unloaded link does too. Without strain beyond yield, the offset does
+// not change in any bit.
 template <std::floating_point T>
 [[nodiscard]] constexpr PlasticLink<T> plastic_link(T difference, T offset, T yield) {
   const T strain = difference - offset;

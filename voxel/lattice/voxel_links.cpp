@@ -232,8 +232,8 @@ void relax_obstacle(LevelStiffness& couplings, Displacement& state, const Obstac
         depth > 0.0 && denominator > 0.0 ? wanted + (depth / denominator) * w * n : wanted;
     const glm::dvec3 within = clamp_to_links(couplings.lattice(), state, v, projected);
     const double now = depth_in_obstacle(o, before);
-    // If limits keep a voxel inside the obstacle from its projection, the minimum within limits and obstacle
-    // is computed below. Otherwise the voxel would never move again.
+    // If limits keep a voxel that is inside the obstacle from reaching its projection, the minimum within
+    // limits and obstacle is computed below. Otherwise the voxel would never move again.
     if (now <= kTouching * couplings.lattice().min_spacing_m() || depth_in_obstacle(o, within) <= now) {
       state.set(v, no_deeper(o, before, within));
       return;

@@ -25,7 +25,7 @@ constexpr double kParted = 0.01;  // of the touching distance: less overlap is l
 // still touch it.
 constexpr double kHollow = 0.005, kFarBeside = 0.5;
 constexpr double kNormalTurn =
-    0.01;                          // share by which the force direction turns to the facet's normal each time
+    0.01;  // fraction of the way to the facet's normal that the force direction turns in each find_facet()
 constexpr int kSteps = 4;          // steps over the surface in search of the facet
 constexpr double kInside = -1e-9;  // barycentric; less is outside
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
@@ -119,7 +119,7 @@ bool shares(const std::array<glm::dvec2, 3>& at, const glm::dvec2& p, std::array
 }
 
 void set_facet(const SoftObject& object, const std::array<VoxelId, 3>& facet, PressedPair& pair) noexcept {
-  if (facet == pair.facet) return;  // 0 is no voxel of any surface
+  if (facet == pair.facet) return;  // never true for the initial facet {0, 0, 0}: 0 is no surface voxel
   pair.facet = facet;
   for (std::size_t i = 0; i < 3; ++i) pair.number[i] = object.surface_number(facet[i]);
 }
@@ -222,7 +222,8 @@ void add_loads(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   });
 }
 
-// If the chain of one object left overlap, the other object yields by it and presses that much harder.
+// If the links of one object left overlap, the other object moves by this overlap. The pair's force grows
+// accordingly.
 void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair, const End& first,
                    const std::array<End, 3>& corners, double yielding_a, double yielding_b) noexcept {
   const double least = kPushed * pair.reach_m;
@@ -414,7 +415,7 @@ double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair)
   }
   a.object.move(pair.a, first.u);
   for_corners(pair, [&](VoxelId v, double, std::size_t i) { b.object.move(v, corners[i].u); });
-  // needed even without a force: links at their limits may keep the voxels from separating
+  // Needed even if the force is 0: links at their limits may keep the voxels from separating
   if (pair.over) push_the_rest(a, b, pair, first, corners, of_first, of_facet);
   return gap_of_pair(a, b, pair);
 }
@@ -428,8 +429,8 @@ bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   const double first = who == GiveWay::second ? 0.0 : of_first;
   const double second = who == GiveWay::first ? 0.0 : of_facet;
   if (!(first + second > 0.0)) return true;
-  // They part along the axis, so that the voxel stays over the facet. Along the normal the voxel would end up
-  // over the next facet, and inside of it.
+  // Voxel and facet part along the axis, so that the voxel stays over the facet. Along the normal the voxel
+  // would end up over the next facet, and inside of it.
   glm::dvec3 along(0.0);
   along[pair.axis] = pair.upwards ? -overlap : overlap;
   const glm::dvec3 in_scene = b.pose.rotation * along;

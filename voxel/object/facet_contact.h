@@ -37,8 +37,8 @@ struct PressedPair {
   bool over = false;               // a facet, or an edge nearby, is under the voxel
   std::array<VoxelId, 3> facet{};  // corners of the facet
   std::array<double, 3> share{};   // the voxel's barycentric coordinates: the corners' shares of the force
-  glm::dvec3 across{0.0};  // gradient of the overlap by the voxel's position, and of the distance by the
-                           // facet's (scene frame)
+  glm::dvec3 across{0.0};  // gradient of the overlap with respect to the voxel's position (scene frame); with
+                           // respect to the facet's position the gradient is the opposite
   double reach_m = 0.0;    // distance of voxel and facet in contact, along the axis
   // Derived from the members above, and kept until the facet is found anew: the gradient in both body frames,
   // the overlap of the surfaces at rest, and the surface numbers of voxel and corners.
@@ -80,11 +80,12 @@ void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair&
 void clear_pair_load(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// One step of block Gauss-Seidel on a pair: its voxels move to the joint minimum of their link energies under
-// the loads of their other pairs, without overlap. Overlap is shared in proportion to compliance. At
-// equilibrium both objects press with equal and opposite force, also if several pairs share a voxel. Voxels
-// that have passed one another press as if they had not. Returns gap_of_pair() afterwards. It is negative if
-// chains leave too little room.
+// One step of block Gauss-Seidel on a pair: its voxels move to the joint minimum of their link energies
+// without overlap. The loads of their other pairs act on them. Where the two surfaces overlap before the
+// step, both move apart, in proportion to their compliance. At equilibrium both objects press with equal and
+// opposite force, also if several pairs share a voxel. A voxel that has passed through the facet is still
+// pressed back to its own side. Returns gap_of_pair() afterwards. It is negative if chains leave too little
+// room.
 double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept;
 
 // Which object's voxels move.

@@ -1,7 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-// The tool on rigid blocks (components without slack). A block is one body of three unknowns. It is pressed
-// if any of its voxels is pressed. It presses back with the sum of all loads on it. Block numbers in Lattice
-// begin with 1, those in RigidBlocks with 0.
+// SPDX-License-Identifier: GPL-3.0-or-later Contact of the tool with rigid blocks (components without slack).
+// A block is one body of three unknowns. It is pressed if any of its voxels is pressed. It presses back with
+// the sum of all loads on it. Block numbers in Lattice begin with 1, those in RigidBlocks with 0.
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -184,8 +183,8 @@ void SoftObject::gather_load_with_blocks(int axis) noexcept {
       look_at(head, v, up ? lattice_->up(v, n / 2) : lattice_->down(v, n / 2), n / 2, up);
     }
   }
-  // A voxel that pulls away from its source may rest on another gathered one; then it counts, too. The sum
-  // does not depend on the link through which its load passes.
+  // A voxel that pulls away from its source may rest on another gathered voxel. Then its load counts, too.
+  // The sum does not depend on the link through which the load passes.
   const auto rests = [&](std::size_t i) {
     const VoxelId v = gathered_[i].v, by = gathered_[dependents_[i].from].v;
     for (int n = 0; n < 6 && lattice_->block(v) == 0; ++n) {

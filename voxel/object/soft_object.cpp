@@ -187,8 +187,8 @@ Displacement::Role SoftObject::resting_role_at(std::uint32_t surface) const noex
                                                                              : Displacement::obstacle;
 }
 
-// Only pressed voxels are kept from the background. A touched voxel without load has to move with its
-// neighbours: if it were held, coarse corrections would shear it, more in each cycle.
+// Only pressed voxels are excluded from background relaxation. A touched voxel without load has to move with
+// its neighbours: if it were held, coarse corrections would shear it, more in each cycle.
 void SoftObject::set_touch_roles() noexcept {
   for (const Touch& t : touches_) {
     const Displacement::Role resting = resting_role_at(t.surface);

@@ -4,7 +4,8 @@
 //
 // Terms: a surface voxel near the tool is *touched* (a contact candidate, one Touch each). A touched voxel
 // that carries load towards the tool is *pressed* (an active contact). A *held* voxel does not move while
-// others relax. *Dependents* of a voxel are tied to it by links at active limits.
+// others relax. *Dependents* of a voxel are tied to it by links at active limits. A *pair* presses a surface
+// voxel of this object and a facet of another soft object on each other (facet_contact.h).
 //
 // One haptic tick calls (see hybrid/tick/tick.cpp): touch() takes the surface voxels near the tool →
 // push_out() moves voxels out of the tool, and the chain follows → relax_near() brings the neighbourhood of
@@ -92,14 +93,14 @@ class SoftObject {
   // A voxel acts as a ball of this radius: the tool's surface stays this far from the voxel's centre.
   [[nodiscard]] double voxel_radius() const { return 0.5 * lattice_->min_spacing_m(); }
   // Distance from a ball tool's centre to the centre of a voxel in contact. A tool smaller than the gaps
-  // between voxels is felt as one that just cannot slip between them.
+  // between voxels is felt as if it were just too large to slip between them.
   [[nodiscard]] double reach(double tool_radius) const;
 
   // A large object may keep its contact on nested patches (composite/grid.h). Then the cost of a tick does
-  // not depend on depth and size. state() stays at rest, as before the contact; displacement() returns the
-  // present displacements. This is only for objects that touch nothing but the tool and rigid surfaces that
-  // stand still. Call it before obstacles are set. If the object is unsuitable, returns the reason and
-  // changes nothing. Returns an empty string if patches are in use. Allocates.
+  // not depend on depth and size. state() then stays at rest, and displacement() returns the present
+  // displacements. Patches are only for objects that touch nothing but the tool and rigid surfaces that stand
+  // still. Call use_composite_grid() before obstacles are set. If the object is unsuitable, returns the
+  // reason and changes nothing. Returns an empty string if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
@@ -136,8 +137,8 @@ class SoftObject {
   [[nodiscard]] bool contact_is_still() const noexcept;
   // In the next tick no contact cycle begins or continues while the tool presses the object.
   void skip_next_cycle() noexcept { skip_requested_ = true; }
-  // Does a part of the work of the next exchange with the ShadowObject one tick ahead. False if too little of
-  // that work is due to be worth a tick.
+  // Prepares the next exchange with the ShadowObject one tick ahead: drops coarse cells. Returns false, and
+  // does nothing, if so few of them are due that they do not need a tick of their own.
   bool prepare_exchange() noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta` (unit: meter): each pressed voxel moves by the component of `delta` along the
@@ -168,8 +169,9 @@ class SoftObject {
   // Call it after obstacles moved: moves these surface voxels out of them in one wave; the chain follows.
   void leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept;
   // Finds the loads of voxels at obstacles. `held` lists each voxel once, in the order of `loads`. Obstacles
-  // press the first `pressed` voxels (kMaxTouched at most); the others are only near. If one of the others
-  // depends on a pressed voxel on an axis, its load counts for that voxel and is 0 here.
+  // press the first `pressed` voxels (kMaxTouched at most); the others are only near. If such a voxel is a
+  // dependent of a pressed one on an axis, its load on that axis is added to the pressed voxel's load, and
+  // its own entry is 0.
   void contact_loads(std::span<const VoxelId> held, std::size_t pressed,
                      std::span<ContactLoad> loads) noexcept;
   // Under asynchronous relaxation: if links at voxels pressed by fixed obstacles are at their limits, relaxes
@@ -198,15 +200,15 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 pair_load(std::uint32_t surface_number) const noexcept {
     return glm::dvec3(pair_load_[surface_number]);
   }
-  // Finds the dependents of the voxels that pairs press, at most kMaxTouched voxels. They are kept until
+  // Finds the dependents of at most kMaxTouched voxels that pairs press. The dependents are kept until
   // forget_pair_dependents().
   void find_pair_dependents() noexcept;
   void forget_pair_dependents() noexcept;
   // Runs one cycle around the voxels that pairs press, or a part of a cycle for a large patch. Does nothing
   // unless these voxels have dependents, the tool presses nothing, and relaxation is asynchronous.
   void relax_near_pairs() noexcept;
-  // For a voxel that pairs press: the load of its dependents, without its own links; the stiffness of the
-  // voxel with its dependents. Zero if no dependents are known.
+  // For a voxel that pairs press. The load is that of the voxel's dependents, without the voxel's own links.
+  // The stiffness is that of the voxel with its dependents. Both are 0 if no dependents are known.
   [[nodiscard]] ContactLoad dependents_of_pair(std::uint32_t surface_number) const noexcept {
     if (pair_dependents_.empty()) return {};
     const std::uint32_t entry = pair_entry_[surface_number];
@@ -218,8 +220,8 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 compliance(VoxelId v) noexcept;
   // Moves a voxel as far as its links allow.
   void move(VoxelId v, const glm::dvec3& displacement) noexcept;
-  // drag() moves a voxel regardless of its links. After all drags settle_dragged() lets the chain follow;
-  // anchors and rigid surfaces may keep a voxel from the place to which it was dragged.
+  // drag() moves a voxel regardless of its links. After all drags, call settle_dragged(): the chain follows.
+  // Anchors and rigid surfaces may keep a voxel from the place to which it was dragged.
   void drag(VoxelId v, const glm::dvec3& by) noexcept;
   void settle_dragged() noexcept;
 
@@ -240,8 +242,8 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
   // Force of the springs on the anchors (N, body frame); at rest it equals the force that presses the object.
-  // Empty if a link to an anchor is at its limit, because its spring does not show the load of that link. For
-  // references.
+  // Empty if a link to an anchor is at its limit, because the spring of such a link does not show the link's
+  // load. For references.
   [[nodiscard]] std::optional<glm::dvec3> carried_by_anchors_N() const noexcept;
   // Energy of the springs plus plastic dissipation since the last state of rest (J). For tests and reports.
   [[nodiscard]] double energy_J() const noexcept;
@@ -263,12 +265,11 @@ class SoftObject {
     bool pressed = false;    // carries load towards the tool
     glm::dvec3 rest{0.0};    // stored, because it is used several times a tick and costs two divisions
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
-    glm::dvec3 load{
-        0.0};  // of its links; with other soft objects, blocks or obstacles also of its dependents (N)
+    glm::dvec3 load{0.0};  // N; of its links; if there are pairs, blocks or obstacles, also of its dependents
     double start_depth = 0.0;       // depth in the tool at the start of the tick (m)
     bool beside_punch = false;      // it was beside a punch at the start of the tick
     bool at_limit = false;          // a link at its limit carries load between the voxel and another one
-    glm::dvec3 frozen_motion{0.0};  // motion that was left to the voxel when the residual was frozen (m)
+    glm::dvec3 frozen_motion{0.0};  // motion to equilibrium that remained when the residual was frozen (m)
     std::uint16_t block = 0;        // number of its rigid block, from 1 on (Lattice::block()); 0: none
   };
   struct Gap {
@@ -276,8 +277,8 @@ class SoftObject {
     glm::dvec3 normal{0.0};
   };
   static constexpr std::size_t kMaxGathered = 20'000;  // pressed voxels and their dependents
-  static constexpr double kDirtyMotion = 1e-5;         // of the spacing: a smaller motion wakes nothing
-  // Of the voxel radius: less overlap is left to the next push_out().
+  static constexpr double kDirtyMotion = 1e-5;  // fraction of the spacing; a smaller motion wakes nothing
+  // Fraction of the voxel radius. A smaller overlap is left to the next push_out().
   static constexpr double kGiveWay = 0.01;
   struct Gathered {
     VoxelId v;
@@ -310,16 +311,16 @@ class SoftObject {
   }
   void set_touch_roles() noexcept;
   void assign_residual() noexcept;  // freezes the residual near the contact: the shadow owns it
-  void keep_frozen_residual(float part) noexcept;  // the shadow still owns this part of it
+  void keep_frozen_residual(float part) noexcept;  // the shadow still owns this fraction
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t shared(std::size_t work) const noexcept;
-  [[nodiscard]] std::size_t left_of(
-      std::size_t work) const noexcept;  // what is left of `work` in this tick; less while memory is cold
-  // Displacements from rest. clamp_depth_in_tool() shortens the way to `place` so that the voxel gets no
-  // deeper into the tool than it is now. project_on_tool_within_limits() finds the least energy on the tool
-  // within the links' limits. project_voxel() is the constrained projection of one touched voxel.
+  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // what this tick has left of `work`
+  // All arguments and results are displacements from rest. clamp_depth_in_tool() shortens the motion from
+  // `now` to `place` so that the voxel gets no deeper into the tool than it is now.
+  // project_on_tool_within_limits() finds the least energy on the tool within the links' limits.
+  // project_voxel() is the constrained projection of one touched voxel.
   [[nodiscard]] glm::dvec3 clamp_depth_in_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                                const glm::dvec3& now, const glm::dvec3& place) const noexcept;
   [[nodiscard]] glm::dvec3 project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
@@ -394,9 +395,10 @@ class SoftObject {
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers; changed since the last submission
   std::vector<std::uint8_t> obstacle_changed_;  // [surface number] 1: in changed_obstacles_; empty: no shadow
   LazyVector<Touch> touches_;
-  LazyVector<Touch> touched_before_;   // pressed touches before touch()
-  std::vector<VoxelId> pressed_last_;  // pressed voxels, kept for the call in which the last one is released
-  ToolInBody tool_;                    // the tool in the last relax_near()
+  LazyVector<Touch> touched_before_;  // pressed touches before touch()
+  std::vector<VoxelId>
+      pressed_last_;  // voxels pressed in the last contact cycle; cleared when none is pressed
+  ToolInBody tool_;   // the tool in the last relax_near()
   std::vector<VoxelId> touched_voxels_;
   std::vector<std::uint32_t> touched_numbers_;  // [as touched_voxels_] surface number
   LazyVector<VoxelId> claimed_voxels_;          // claimed by pairs
@@ -408,7 +410,7 @@ class SoftObject {
   std::vector<std::uint8_t> block_seen_;    // [block] 1: for_touched_blocks() has visited it
   LimitReactions limit_reactions_;
   LimitFollowers limit_followers_;
-  std::vector<VoxelId> limit_sources_;     // sources for both of these: pressed voxels that are not anchored
+  std::vector<VoxelId> limit_sources_;     // sources of the two above: pressed, not anchored
   LazyVector<Gathered> gathered_;          // pressed voxels first, then their dependents
   LazyVector<Dependent> dependents_;       // [as gathered_]
   LazyArray<std::uint8_t> gathered_mark_;  // [v] 1: in gathered_ (within touch(): was pressed; between drag()
@@ -423,15 +425,15 @@ class SoftObject {
   bool split_cycle_ = false;  // a cycle around a large patch ran, or a part of one
   bool skip_requested_ = false;
   bool skips_cycle_ = false;  // no contact cycle begins in this tick unless the tool jumps
-  bool dragging_ = false;     // sources_ lists dragged voxels, moves_ where they were
+  bool dragging_ = false;     // sources_ lists the dragged voxels, moves_ their displacements before the drag
   bool moved_ever_ = false;
   bool anchors_pull_ = false;   // since push_out() a wave of the chain reached anchors that stopped it
   bool beside_bodies_ = false;  // prepare_beside_bodies() was called
-  bool on_grid_ = false;        // there is a contact, and it is on nested patches
+  bool on_grid_ = false;        // a contact exists, and its displacements are on nested patches
   std::unique_ptr<CompositeGrid> grid_;  // null: contacts are in state_
   double patch_error_ = 0.0;
   std::vector<VoxelId> near_on_grid_;
-  struct TouchOnGrid {  // touched voxels in the finest patch, as a cycle begins
+  struct TouchOnGrid {  // a touched voxel in the finest patch at the start of a cycle
     std::uint32_t touch;
     std::array<int, 3> voxel;
     double gap_m;

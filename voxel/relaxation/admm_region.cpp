@@ -24,7 +24,8 @@ constexpr double kNearLimit = 0.4;
 // Limits are tightened by this while the least energy is searched, so that the result hardly violates them
 // (unit: spacing).
 constexpr double kTighter = 2e-5;
-// The same under the tool, where cycles and the tick continue from the result up to the limits themselves.
+// Replaces kTighter under the tool. There cycles and the tick continue from the result up to the limits
+// themselves.
 constexpr double kTighterAtTool = 2e-6;
 constexpr double kSqueezed = 5e-3;  // (unit: spacing) a voxel deeper in an obstacle than this is squeezed: it
                                     // cannot leave the obstacle

@@ -36,7 +36,7 @@ class AdmmRegion {
   explicit AdmmRegion(const Lattice& lattice);
   // Allocates all memory now rather than when a body is first pressed.
   void prepare_all();
-  // The same without the arrays by voxel, most of which a tool never touches.
+  // Allocates all memory except the arrays by voxel, most of which a tool never touches.
   void prepare_lists();
 
   // Relaxes a region: voxels that active limits hold or that are in `on_body`, and their neighbourhood, which
@@ -72,7 +72,7 @@ class AdmmRegion {
     VoxelId v = 0;
     bool moves = false;    // false: a fixed voxel that borders the region
     bool outside = false;  // it has to stay outside of an obstacle or of the tool
-    Obstacle plane;        // the half-space of that obstacle, for the displacement
+    Obstacle plane;        // half-space that bounds the displacement, of the obstacle or the tool
     std::array<std::uint32_t, 3> up{kNone, kNone, kNone},
         down{kNone, kNone, kNone};  // neighbours, as indices into members_
     Axes from{}, found{};           // displacement before, and of the current iterate (m)
