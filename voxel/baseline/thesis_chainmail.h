@@ -27,7 +27,7 @@ struct ThesisChainMailOptions {
   // stiffness. `sum`: by the sum of the moves that its links require, as in the thesis's first version (Fig
   // 22).
   enum class Movement : std::uint8_t { mean, sum } movement = Movement::mean;
-  double damping = 1.0;    // factor on that movement; 1: undamped. The thesis's remedy is "some small value"
+  double damping = 1.0;    // factor on the movement; 1: undamped. The thesis recommends "some small value"
   bool six_points = true;  // false: the tool is a point (the thesis before Figs 20 and 21)
   bool lock = false;       // locks the object for each element that is visited (Fig 23)
 };
@@ -56,7 +56,7 @@ class ThesisChainMail {
   // candidates. The queue may grow, and so allocate. Incompatible sources would push one another endlessly:
   // after kMaxRounds candidates per cell and direction the rest is dropped, and gave_up() is true.
   void move(std::span<const ElementId> sources, std::span<const glm::vec3> moves);
-  // Of the last move().
+  // Results of the last move(): number of candidates; were candidates dropped?
   [[nodiscard]] std::uint64_t candidates() const { return candidates_; }
   [[nodiscard]] bool gave_up() const { return gave_up_; }
   static constexpr std::uint64_t kMaxRounds = 20;

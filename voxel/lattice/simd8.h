@@ -14,7 +14,7 @@
 
 namespace voxel {
 
-inline constexpr int kLanes = 8;                   // lanes
+inline constexpr int kLanes = 8;                   // lanes of a vector
 inline constexpr int kLaneGroups = kRow / kLanes;  // lane groups of a row
 
 using Float8 = float __attribute__((vector_size(32)));

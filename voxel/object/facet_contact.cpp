@@ -24,10 +24,10 @@ constexpr double kParted = 0.01;  // of the touching distance: less overlap is l
 // middle of the other facet by at least this. kFarBeside, barycentric: how far beside a facet a voxel may
 // still touch it.
 constexpr double kHollow = 0.005, kFarBeside = 0.5;
-constexpr double kNormalTurn =
-    0.01;  // fraction of the way to the facet's normal that the force direction turns in each find_facet()
-constexpr int kSteps = 4;          // steps over the surface in search of the facet
-constexpr double kInside = -1e-9;  // barycentric; less is outside
+constexpr double kNormalTurn = 0.01;  // fraction of the way to the facet's normal that the force direction
+                                      // turns at each update of the facet
+constexpr int kSteps = 4;             // steps over the surface in search of the facet
+constexpr double kInside = -1e-9;     // barycentric; less is outside
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
 
 struct End {

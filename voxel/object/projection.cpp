@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Constrained projection of one touched voxel: the displacement of
-// least link energy outside of the tool and of the obstacle, within the links' limits. All other voxels are
-// fixed.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Constrained projection of one touched voxel: the displacement of least link energy outside of the tool and
+// of the obstacle, within the links' limits. All other voxels are fixed.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>

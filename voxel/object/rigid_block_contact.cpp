@@ -1,6 +1,7 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Contact of the tool with rigid blocks (components without slack).
-// A block is one body of three unknowns. It is pressed if any of its voxels is pressed. It presses back with
-// the sum of all loads on it. Block numbers in Lattice begin with 1, those in RigidBlocks with 0.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Contact of the tool with rigid blocks (components without slack). A block is one body of three unknowns. It
+// is pressed if any of its voxels is pressed. It presses back with the sum of all loads on it. Block numbers
+// in Lattice begin with 1, those in RigidBlocks with 0.
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>

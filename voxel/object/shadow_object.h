@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Asynchronous relaxation of a soft object: a second state of the
-// same object (its shadow), which another thread brings nearer to rest while the tick moves the object
-// itself.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Asynchronous relaxation of a soft object: a second state of the same object (its shadow), which another
+// thread brings nearer to rest while the tick moves the object itself.
 //
 // Tick and thread take turns with the shadow, and neither waits for the other:
 //
@@ -8,7 +8,7 @@
 // relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels where they were
 //               submitted, and packs what changed (the result);
 // apply_near()  later the tick adds the result's rows near the contact: at once, so that no step is felt, or
-//               in parts, each of which leaves the residual of the rest frozen;
+//               in parts, while the residual of the parts still to come stays frozen;
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
 //
 // Without active limits displacements are linear, so a result can be added to the motion that the tick made

@@ -4,8 +4,8 @@
 //
 // Terms: a surface voxel near the tool is *touched* (a contact candidate, one Touch each). A touched voxel
 // that carries load towards the tool is *pressed* (an active contact). A *held* voxel does not move while
-// others relax. *Dependents* of a voxel are tied to it by links at active limits. A *pair* presses a surface
-// voxel of this object and a facet of another soft object on each other (facet_contact.h).
+// others relax. *Dependents* of a voxel are tied to it by links at active limits. A *pair* is a contact of a
+// voxel of one soft object with a facet of another (facet_contact.h). It presses voxels of both.
 //
 // One haptic tick calls (see hybrid/tick/tick.cpp): touch() takes the surface voxels near the tool →
 // push_out() moves voxels out of the tool, and the chain follows → relax_near() brings the neighbourhood of
