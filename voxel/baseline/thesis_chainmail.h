@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`; sessions do not use it.
 //
-// Its parts are ChainMail by a first-come queue of candidates with their sponsors (Figs 6 to 9), contact by a
-// point and six directions on a dense occupancy map (Fig 16), a force from the lines of links through the
-// touched element (getForce), and a relaxation in which each element moves as its links require, damped or
-// not. The implementation is efficient: dense arrays, 16 bytes per element, a queue that stops allocating
-// once it has grown. In two respects it differs from the thesis, so that neither rounding nor units count
-// against it: it stores displacements from rest instead of absolute positions, and its springs have the
-// moduli of `Lattice`. (Springs on a border are whole ones, as in the thesis; `Lattice` halves them.)
+// It has four parts. ChainMail uses a first-come queue of candidates with their sponsors (Figs 6 to 9).
+// Contact tests a point and six directions on a dense occupancy map (Fig 16). The force comes from the three
+// lines of links through the touched element (getForce). In relaxation each element moves as its links
+// require, damped or not. The implementation is efficient: dense arrays, 16 bytes per element, a queue that
+// stops allocating once it has grown. In two respects it differs from the thesis, so that neither rounding
+// nor units count against it: it stores displacements from rest instead of absolute positions, and its
+// springs have the moduli of `Lattice`. (Springs on a border are whole ones, as in the thesis; `Lattice`
+// halves them.)
 #pragma once
 
 #include <array>

@@ -2,10 +2,10 @@
 // The six-link energy: spring stiffness of a link.
 //
 // A link along d of length h_d has a spring of E·A/h_d along it and of G·A/h_d across it, where A is the
-// product of the two other spacings. A voxel is a node: an object, and a region of stiffer tissue within it,
-// ends at the centres of its outermost voxels. Around a link lie four cells of eight voxels, and the link
-// stands for a quarter of each. E and G are the means of the four quarters; a quarter is 0 if its cell lacks
-// a voxel.
+// product of the two other spacings. A voxel is a node. So an object ends at the centres of its outermost
+// voxels, and so does a region of stiffer tissue within it. Around a link lie four cells of eight voxels, and
+// the link stands for a quarter of each. E and G are the means of the four quarters; a quarter is 0 if its
+// cell lacks a voxel.
 #pragma once
 
 #include <array>
@@ -110,7 +110,7 @@ struct LinkParts {
 }
 
 // Moduli for the springs beside the bricks of the accurate energy (voxel/fem/hex_element.h). Bricks replace
-// the cells; tissue too thin for a brick keeps its links. Both act on the same voxels.
+// the cells; tissue too thin for a brick keeps its links. Bricks and links act on the same voxels.
 [[nodiscard]] constexpr LinkModuli link_moduli_beside_bricks(const std::array<LinkModuli, 9>& links) {
   return link_parts(links).thin;
 }

@@ -26,11 +26,11 @@ struct PlasticLink {
   T offset;   // rest difference from now on (m)
 };
 
-// `difference` = u(b) − u(a) on one axis, `offset` its rest value so far, `yield` >= 0 the yield strain times
-// the link's length, infinite if the link never yields (all in m). The new offset lies between the old offset
-// and the difference. The chain's limits are relative to the initial rest length. So if the old offset and
-// the difference keep the limits, the unloaded link does too. Without strain beyond yield, the offset does
-// not change in any bit.
+// `difference` is u(b) − u(a) on one axis, and `offset` is its rest value so far (both in m). `yield` >= 0 is
+// the yield strain times the link's length (m); infinite if the link never yields. The new offset lies
+// between the old offset and the difference. The chain's limits are relative to the initial rest length. So
+// if the old offset and the difference keep the limits, the unloaded link does too. Without strain beyond
+// yield, the offset does not change in any bit.
 template <std::floating_point T>
 [[nodiscard]] constexpr PlasticLink<T> plastic_link(T difference, T offset, T yield) {
   const T strain = difference - offset;

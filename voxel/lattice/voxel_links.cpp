@@ -181,8 +181,8 @@ glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dve
 namespace {
 
 // Place of least energy within the intervals low … high and outside the obstacle. `wanted` is the minimum
-// without either; w is the compliance. The obstacle's multiplier grows from 0 and moves each axis at the rate
-// w·n, while that axis lies in its interval, until the place is outside. A projection that is clamped
+// without either; w is the compliance. The obstacle's multiplier grows from 0 until the place is outside.
+// Meanwhile each axis moves at the rate w·n as long as it lies in its interval. A projection that is clamped
 // afterwards would be wrong: an axis at its limit would not be compensated by the other axes.
 glm::dvec3 least_outside(const Obstacle& o, const glm::dvec3& w, const glm::dvec3& wanted,
                          const glm::dvec3& low, const glm::dvec3& high) noexcept {

@@ -175,7 +175,7 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
   }
 }
 
-// As gather_load(), for an object that other soft objects press. Their loads enter at the far end of the
+// Replaces gather_load() for an object that other soft objects press. Their loads enter at the far end of the
 // chain and pass through voxels whose own links pull the other way. So all dependents are searched first, and
 // loads are added up from the far end.
 void SoftObject::gather_load_with_pairs(int axis) noexcept {
@@ -206,7 +206,7 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
       [&](std::size_t i, double load) { touches_[gathered_[i].touch].load[axis] += load; });
 }
 
-// As gather_load_with_pairs(), for voxels that a rigid surface or a pair presses.
+// Like gather_load_with_pairs(), but for voxels that a rigid surface or a pair presses.
 void SoftObject::add_dependents(int axis, std::span<const VoxelId> pressed,
                                 std::span<ContactLoad> loads) noexcept {
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
@@ -351,8 +351,8 @@ void SoftObject::reassign_multiplier(int axis) noexcept {
   }
 }
 
-// Marks are reset. If they held the number of the gathering instead, a 32-bit number would wrap after four
-// days of contact, and every voxel ever gathered would count as gathered.
+// Resets all marks to 0. Marks with the number of the search would not need a reset. But a 32-bit number
+// would wrap after four days of contact, and then every voxel ever gathered would count as gathered.
 void SoftObject::clear_gathered() noexcept {
   for (const Gathered& c : gathered_) gathered_mark_[c.v] = 0;
   gathered_.clear();

@@ -12,7 +12,7 @@
 namespace voxel {
 namespace {
 
-// As kAtLimit, for links of dependents, which lag a little as the tool withdraws.
+// Replaces kAtLimit for links of dependents, which lag a little as the tool withdraws.
 constexpr double kAtLimitLagging = 1e-3;
 
 }  // namespace
@@ -136,9 +136,10 @@ glm::dvec3 SoftObject::dependents_of_block(std::size_t block,
   return force;
 }
 
-// As gather_load_with_pairs(), with each block as one voxel that is loaded as a whole. The load of a single
-// voxel of a block does not say which way the block passes it on: tissue at its limits between the tool and
-// an inclusion is pulled down and still carries the inclusion's load upwards.
+// Like gather_load_with_pairs(), but treats each block as one voxel that is loaded as a whole. The load of a
+// single voxel of a block does not show the direction in which the block passes load on. For example, tissue
+// at its limits between the tool and an inclusion is pulled down, and still carries the inclusion's load
+// upwards.
 void SoftObject::gather_load_with_blocks(int axis) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];

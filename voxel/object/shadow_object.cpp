@@ -13,11 +13,11 @@ namespace {
 
 // Rows near the contact that a tick applies at once, at most. If a contact has more rows, steps are felt.
 constexpr std::size_t kMaxAtOnce = 1000;
-// A whole cycle reduces the error at the contact only a little. So kContactCycles contact cycles follow it
-// while the tool moves by more than kMoved spacings from one submission to the next, and in kUnsettled
-// results in all after such a motion. At rest no contact cycles follow. They would end before coarse cells
-// outside of their boxes receive the last sweeps of the whole cycle, so a voxel that barely touches the tool
-// would be released and pressed in turns.
+// A whole cycle reduces the error at the contact only a little. So kContactCycles contact cycles follow it in
+// the next kUnsettled results after the tool moved by more than kMoved spacings between two submissions. At
+// rest no contact cycles follow. Coarse cells outside of their boxes would receive the last sweeps of the
+// whole cycle only in the next cycle. So a voxel that barely touches the tool would be released and pressed
+// in turns.
 constexpr int kContactCycles = 4, kUnsettled = 4;
 // Cycles around a pressed rigid block that follow the whole cycle, too.
 constexpr int kBlockCycles = 4;

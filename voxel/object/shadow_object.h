@@ -12,10 +12,10 @@
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
 //
 // Without active limits displacements are linear, so a result can be added to the motion that the tick made
-// meanwhile. Each residual must then be owned by exactly one of the two solvers. What was submitted belongs
-// to the thread: around the contact it counts as frozen from then on (Relaxation::assign_residual), and the
-// tick relaxes only what it moves itself. If the tick leaves X of its own residual and a cycle of the thread
-// leaves Y of the thread's residual, X + Y is left in total.
+// meanwhile. Each residual must then be owned by exactly one of the two solvers. The submitted residual
+// belongs to the thread. Around the contact it counts as frozen from then on (Relaxation::assign_residual),
+// and the tick relaxes only the residual of its own motion. If the tick leaves X of its own residual and a
+// cycle of the thread leaves Y of the thread's residual, X + Y is left in total.
 //
 // Coarse cells are not exchanged: each side has its own. Changes too small to matter are deferred until all
 // is at rest.
@@ -257,7 +257,7 @@ class ShadowObject {
   RetryQueue retry_;                             // entries of that result to try again
   bool retries_rows_ = false;                    // rows that could not follow are tried again
   bool together_ = false;                        // rows near the contact are applied together
-  std::size_t near_count_ = 0;                   // rows near the contact in the other result
+  std::size_t near_count_ = 0;                   // number of rows near the contact in the result packed last
   int parts_left_ = 0;                           // parts of the rows near the contact still to be applied
   bool at_rest_ = true;
   double residual_N_ = 0.0;

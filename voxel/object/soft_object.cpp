@@ -108,7 +108,7 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
   if (tool.shape == ToolInBody::Shape::punch) {
     const double along = glm::dot(d, tool.axis);
     const double across2 = glm::dot(d, d) - along * along;
-    // The face presses what lies in front of it, not behind it.
+    // The face presses tissue in front of it, not behind it.
     const bool under = across2 <= tool.radius * tool.radius && along > -4.0 * lattice_->max_spacing_m();
     return {under ? along - voxel_radius() : std::numeric_limits<double>::max(), tool.axis};
   }

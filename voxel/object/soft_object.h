@@ -54,7 +54,7 @@ struct ContactLoad {
   glm::dvec3 force_N{0.0};            // of its links and of its dependents
   glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of the voxel and its dependents, all others fixed
   bool at_limit = false;              // a link at its limit carries load between the voxel and another one
-  bool has_multipliers = false;  // known: multipliers of limits and obstacles around the voxel (AdmmRegion)
+  bool has_multipliers = false;  // AdmmRegion knows the multipliers of limits and obstacles around the voxel
   double pressed_N = 0.0;        // force of its obstacle along the normal; 0 unless has_multipliers
 };
 
@@ -76,7 +76,7 @@ class SoftObject {
   SoftObject& operator=(const SoftObject&) = delete;
   SoftObject(SoftObject&&) = delete;
   SoftObject& operator=(SoftObject&&) = delete;
-  // The same object in the same state; the lattice is shared. For references beside a running session.
+  // Returns an object in the same state that shares the lattice. For references beside a running session.
   // Allocates.
   [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
 
@@ -121,7 +121,7 @@ class SoftObject {
   // Moves every touched voxel out of the tool, and the chain follows. True if any voxel overlapped the tool.
   bool push_out(const ToolInBody& tool) noexcept;
   void relax_near(const ToolInBody& tool, int sweeps) noexcept;
-  // Has a cycle around a large contact patch, or part of such a cycle, run since touch()?
+  // True if a cycle around a large contact patch, or a part of one, ran since touch().
   [[nodiscard]] bool large_patch_cycle() const { return split_cycle_; }
   // Share (0 to 1) of the counted work that a tick may spend on its contact under asynchronous relaxation;
   // less than 1 for a slow machine. Later ticks do the remaining work.
@@ -150,17 +150,18 @@ class SoftObject {
   // the tool but must not push it: the tool may stay as deep as it was when the tick began. A voxel that was
   // beside a punch when the tick began bounds the punch sideways. Returns the number of bounds written.
   std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
-  // Does a chain of links at their limits tie the voxel to something that does not move along `direction`, an
-  // anchor or a voxel on a rigid surface? Searches along the largest component of `direction`, through a few
-  // hundred voxels at most.
+  // Does a chain of links at their limits tie the voxel to an anchor, or to a voxel that a rigid surface
+  // stops along `direction`? Searches along the largest component of `direction`, through a few hundred
+  // voxels at most.
   [[nodiscard]] bool is_immovable(VoxelId v, const glm::dvec3& direction) noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
-  // One cycle over the whole object, whatever it costs; nothing if the object is at rest.
+  // Runs one cycle over the whole object, without a limit on its work. Does nothing if the object is at rest.
   void relax_cycle() noexcept;
 
   // Call it before the first set_obstacle(). Allocates.
   void reserve_obstacles();
-  // Call it if obstacles will move, before a ShadowObject is made. Allocates all memory for that.
+  // Call it if obstacles will move, before a ShadowObject is made. Allocates all memory that moving obstacles
+  // need.
   void prepare_beside_bodies();
   // Sets the rigid surface near surface voxel number s (index into lattice().surface()). A zero normal
   // removes it.
@@ -169,9 +170,9 @@ class SoftObject {
   // Call it after obstacles moved: moves these surface voxels out of them in one wave; the chain follows.
   void leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept;
   // Finds the loads of voxels at obstacles. `held` lists each voxel once, in the order of `loads`. Obstacles
-  // press the first `pressed` voxels (kMaxTouched at most); the others are only near. If such a voxel is a
-  // dependent of a pressed one on an axis, its load on that axis is added to the pressed voxel's load, and
-  // its own entry is 0.
+  // press the first `pressed` voxels (kMaxTouched at most); the others are only near. If one of these is a
+  // dependent of a pressed voxel on an axis, its own force on that axis is 0: the force is added to that of
+  // the pressed voxel.
   void contact_loads(std::span<const VoxelId> held, std::size_t pressed,
                      std::span<ContactLoad> loads) noexcept;
   // Under asynchronous relaxation: if links at voxels pressed by fixed obstacles are at their limits, relaxes
@@ -395,17 +396,16 @@ class SoftObject {
   std::vector<std::uint32_t> changed_obstacles_;  // surface numbers; changed since the last submission
   std::vector<std::uint8_t> obstacle_changed_;  // [surface number] 1: in changed_obstacles_; empty: no shadow
   LazyVector<Touch> touches_;
-  LazyVector<Touch> touched_before_;  // pressed touches before touch()
-  std::vector<VoxelId>
-      pressed_last_;  // voxels pressed in the last contact cycle; cleared when none is pressed
-  ToolInBody tool_;   // the tool in the last relax_near()
+  LazyVector<Touch> touched_before_;   // pressed touches before touch()
+  std::vector<VoxelId> pressed_last_;  // in the last contact cycle; empty if none is pressed
+  ToolInBody tool_;                    // the tool in the last relax_near()
   std::vector<VoxelId> touched_voxels_;
   std::vector<std::uint32_t> touched_numbers_;  // [as touched_voxels_] surface number
   LazyVector<VoxelId> claimed_voxels_;          // claimed by pairs
   LazyVector<VoxelId> held_voxels_;             // voxels pressed by the tool, then those claimed by pairs
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
-  std::vector<BlockBound> block_bounds_;    // bounds of one rigid block: those of its touches, then others
+  std::vector<BlockBound> block_bounds_;    // of one rigid block: first by the tool, then by limits
   std::vector<std::uint32_t> bound_touch_;  // [as the first of block_bounds_] index into touches_
   std::vector<std::uint8_t> block_seen_;    // [block] 1: for_touched_blocks() has visited it
   LimitReactions limit_reactions_;
