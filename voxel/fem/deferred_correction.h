@@ -31,7 +31,7 @@ class BrickLoads {
  public:
   explicit BrickLoads(const Lattice& lattice);
 
-  // Are there loads that this object renews? False without bricks and after leave_to_shadow().
+  // True if there are loads that this object renews. False without bricks and after leave_to_shadow().
   [[nodiscard]] bool any() const { return share_ > 0.0F; }
   void leave_to_shadow() noexcept { share_ = 0.0F; }
   // Loads whose error is at most `least_N` are not renewed.
@@ -63,7 +63,7 @@ class BrickLoads {
     if (changed) mark_[row] &= static_cast<std::uint8_t>(~kChanged);
     return changed;
   }
-  // Every row that was due when the last round began has been examined.
+  // True if every row that was due when the last round began has been examined.
   [[nodiscard]] bool round_ended() const { return next_ == due_.count; }
   // Largest error of a load in the last complete round (N).
   [[nodiscard]] float unbalanced_N() const { return left_N_; }

@@ -53,8 +53,8 @@ struct Displacement {
     held = 1,      // near the tool or another soft object: moved by the contact solver only
     obstacle = 2,  // near a rigid surface: also subject to n·u >= bound
     pressed = 3,   // on the tool only: slides along the tool's surface (tangential_contact.h)
-    // In a block without slack (rigid_blocks.h): moves with its block only, whatever else touches it. Voxels
-    // keep this role from construction on. The second value marks those near a rigid surface.
+    // In a block without slack (rigid_blocks.h): moves with its block only, even if something touches it.
+    // Voxels keep this role from construction on. The second value marks those near a rigid surface.
     joined = 5,
     joined_at_obstacle = 7,
   };

@@ -145,7 +145,7 @@ class LevelStiffness {
   }
   // Limits of a prepared row of level 0.
   [[nodiscard]] RowLimits limits(RowId row) const noexcept;
-  // Springs of one voxel or cell on all axes. Prepares its row; afterwards it takes a few loads.
+  // Springs of one voxel or cell on all axes. Prepares its row; for a prepared row it takes a few loads only.
   [[nodiscard]] VoxelSprings springs_of(VoxelId cell) noexcept;
   // Returns the springs of springs_of(), to the last bit, but does not prepare the row. Slower if the row is
   // not prepared.

@@ -44,8 +44,8 @@ struct PlasticOffsets {
 };
 
 // Plastic load on a voxel at the present displacements (N, per axis). The loads of rows date from their last
-// renewal. A contact needs the present load: with the old one, a held tool and its tissue would keep reacting
-// to each other's last round and never come to rest.
+// renewal. A contact needs the present load: with the load of the last renewal, a held tool and its tissue
+// would keep reacting to each other and never come to rest.
 std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& state,
                                   const VoxelSprings& springs, VoxelId v) noexcept;
 

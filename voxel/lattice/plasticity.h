@@ -2,14 +2,14 @@
 // Perfect plasticity of a link: tissue that keeps a dent.
 //
 // On each axis a link is elastic up to the yield strain. The excess becomes its new rest length. The axes are
-// independent, like those of the energy and of the limits. A criterion on all three (as von Mises's) would
-// couple three problems that are solved separately.
+// independent, like those of the energy and of the limits. A criterion on all three axes (such as von
+// Mises's) would couple three problems that are solved separately.
 //
 // Within a step the offset stays constant. The force is k·elastic, the derivative of a convex energy
-// (`link_energy_J`: a parabola continued by straight lines). Its minimum is one state that does not depend on
-// the path. The offset moves once, when this state is reached. An offset that moved earlier would keep the
-// strains of a wave that has not spread yet, and the dent would depend on the number of cycles. This is the
-// backward Euler step of rate-independent plasticity (Simo & Hughes, Computational Inelasticity, 1998,
+// (`link_energy_J`: a parabola continued by straight lines). The energy has a single minimum, which does not
+// depend on the path. The offset moves once, when the minimum is reached. An offset that moved earlier would
+// keep the strains of a wave that has not spread yet, and the dent would depend on the number of cycles. This
+// is the backward Euler step of rate-independent plasticity (Simo & Hughes, Computational Inelasticity, 1998,
 // section 1.4). The energy is nowhere more curved than its parabola, so cycles of the elastic problem never
 // raise it. The final offset depends on the final strain only, so any number of steps that only load leaves
 // the same offset.

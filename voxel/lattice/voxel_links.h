@@ -40,7 +40,7 @@ struct VoxelLinks {
   std::array<std::array<float, 2>, 3> interval{};  // link_interval(), [axis]
 };
 VoxelLinks links_of(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept;
-// As clamp_to_links() above, with the intervals of `links`; `now` is the present displacement.
+// Like clamp_to_links() above, but with the intervals of `links`; `now` is the present displacement.
 glm::dvec3 clamp_to_links(const VoxelLinks& links, const glm::dvec3& wanted, const glm::dvec3& now) noexcept;
 
 struct ObstacleView {

@@ -48,8 +48,8 @@ struct PressedPair {
   std::array<std::uint32_t, 3> number{};
 };
 
-// A pair of a voxel of the first surface and one of the second that may touch. `side` is 0 if the two
-// surfaces face the same way, so that the order of the objects is unknown.
+// Makes a pair of two surface voxels that may touch, one of each object. `side` is 0 if the two surfaces face
+// the same way. Then it is unknown on which side of each other the objects are.
 [[nodiscard]] PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b,
                                   VoxelId in_b) noexcept;
 
@@ -75,8 +75,9 @@ void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) n
 void claim_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// Load of a pair on its voxels, as their objects know it. Before a round of relax_pair(): clear_pair_load()
-// on all pairs, then load_pair() once a pair, so that rounding errors do not accumulate.
+// Set the pair loads of the voxels (SoftObject::pair_load()) to 0, and add the load of a pair. Before a round
+// of relax_pair(): clear_pair_load() on all pairs, then load_pair() once a pair, so that rounding errors do
+// not accumulate.
 void clear_pair_load(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 

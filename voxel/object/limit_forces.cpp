@@ -175,9 +175,9 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
   }
 }
 
-// Replaces gather_load() for an object that other soft objects press. Their loads enter at the far end of the
-// chain and pass through voxels whose own links pull the other way. So all dependents are searched first, and
-// loads are added up from the far end.
+// Replaces gather_load() for an object that other soft objects press. The loads of these objects enter at the
+// far end of the chain and pass through voxels whose own links pull the other way. So all dependents are
+// searched first, and loads are added up from the far end.
 void SoftObject::gather_load_with_pairs(int axis) noexcept {
   gathered_.clear();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];

@@ -6,7 +6,7 @@
 //
 // submit()      the tick hands over the rows that changed since the last submission;
 // relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels where they were
-//               submitted, and packs what changed (the result);
+//               submitted, and packs the changes (the result);
 // apply_near()  later the tick adds the result's rows near the contact: at once, so that no step is felt, or
 //               in parts, while the residual of the parts still to come stays frozen;
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
@@ -96,7 +96,7 @@ class ShadowObject {
   static std::size_t at(RowId row) { return static_cast<std::size_t>(row) * kRow; }
 
   // Rows on their way from one thread to the other. They are contiguous in memory, because fetching data that
-  // another core wrote costs more than adding them.
+  // another core wrote costs more than adding the rows.
   class RowDelta {
    public:
     // Stores `arrays` arrays per row: [array][lane].

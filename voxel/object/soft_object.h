@@ -135,7 +135,7 @@ class SoftObject {
   // Does the tool press a large patch and hardly move? Slip of single voxels and results that are still to
   // come do not count as motion.
   [[nodiscard]] bool contact_is_still() const noexcept;
-  // In the next tick no contact cycle begins or continues while the tool presses the object.
+  // Makes the next tick neither begin nor continue a contact cycle while the tool presses the object.
   void skip_next_cycle() noexcept { skip_requested_ = true; }
   // Prepares the next exchange with the ShadowObject one tick ahead: drops coarse cells. Returns false, and
   // does nothing, if so few of them are due that they do not need a tick of their own.
@@ -293,8 +293,8 @@ class SoftObject {
 
   [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + displacement(t.v); }
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
-  // Projects a voxel out of the tool, in the metric of its springs. `wished`: displacement that its links
-  // want. `g`: its gap there on entry, its last gap on return.
+  // Projects a voxel out of the tool, in the metric of its springs. `wished`: displacement at the equilibrium
+  // of its links. `g`: on entry its gap at `wished`, on return its gap after the last projection.
   [[nodiscard]] glm::dvec3 project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                            const glm::dvec3& wished, const glm::dvec3& compliance,
                                            Gap& g) const noexcept;

@@ -32,7 +32,7 @@ constexpr double kTangent = 2.0, kAcross = 0.5;
 constexpr double kWithDepth = 1.7;
 // Least depth at which displacements are scaled (spacings); largest scaling in a cycle (share of the depth).
 constexpr double kLeastToScale = 0.1, kMostScaled = 1.0;
-constexpr double kLeastDepth = 0.05;  // of the spacing: least depth for the secant stiffness
+constexpr double kLeastDepth = 0.05;  // fraction of the spacing: least depth for the secant stiffness
 constexpr double kNear = 3.0;         // spacings: surface voxels further from the tool are skipped
 constexpr double kAtRest_N = 1e-5;    // force on the tool below which a contact with nothing pressed ends
 constexpr double kMoves = 0.03;       // spacings: a tool that moved further gets a second cycle in the tick
@@ -340,7 +340,7 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   if (away && glm::length(grid_force_N_) < kAtRest_N) on_grid_ = false;
 }
 
-// Displacement of the contact against the force (unit: meter).
+// Displacement of the contact's centre in the direction opposite to the force (unit: meter).
 double SoftObject::depth_on_grid() const noexcept {
   const double size = glm::length(grid_force_N_);
   if (size == 0.0 || !grid_->in_fine_patch(centre_)) return 0.0;
@@ -367,7 +367,8 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
     result.stiffness_N_per_m =
         glm::dmat3(kAcross * secant) + (kTangent - kAcross) * secant * glm::outerProduct(n, n);
   }
-  // Until the next cycle: the last force, less stiffness times the tool's motion since then.
+  // Until the next cycle the force is that of the last cycle, less stiffness times the tool's motion since
+  // then.
   result.force_N = grid_force_N_ - result.stiffness_N_per_m * (tool.centre - grid_tool_m_);
   if (glm::dot(result.force_N, n) < 0.0) result.force_N = glm::dvec3(0.0);
   result.force_N *= contact_energy_.share();

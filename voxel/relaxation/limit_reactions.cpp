@@ -33,8 +33,8 @@ struct LimitReactions::Gathering {
   std::bitset<Lattice::kMaxBlocks> known;
   std::array<double, Lattice::kMaxBlocks> pull_N;  // [block] valid if known[block]
 
-  // Voxels of a rigid block get the sign of the block's load. Their own loads have either sign, and would end
-  // the search at an inclusion.
+  // Gives the voxels of a rigid block the sign of the block's load. Their own loads may have either sign,
+  // which would end the search at an inclusion.
   void pull_as_blocks(const Displacement& state, int axis, Row& row) {
     std::uint32_t of_blocks = 0, up = 0, down = 0;
     std::uint16_t last = 0;  // most rows hold one block only

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dependents of given voxels through links at their limits, and the loads and springs of all of them
-// together.
+// Finds the dependents of given voxels through links at their limits, and sums their loads and the stiffness
+// of their springs.
 //
 // The search handles a row of 32 voxels at a time, as bits, because a tool that has pushed a chain to its
 // limits has some ten thousand dependents.
@@ -30,10 +30,10 @@ class LimitReactions {
   // Allocates; throws std::bad_alloc.
   explicit LimitReactions(const Lattice& lattice);
 
-  // ---- none of these allocates or throws ---- Finds, on one axis, all dependents of `sources` (sorted by
-  // id, none anchored), directly or through others. A voxel depends on a neighbour in two cases. Either their
-  // link is at a limit and pushes the voxel against its own load, or the link lets the voxel move neither
-  // way. Drops what was found before.
+  // ---- none of these allocates or throws ----
+  // Finds, on one axis, all dependents of `sources` (sorted by id, none anchored), directly or through
+  // others. A voxel depends on a neighbour in two cases. Either their link is at a limit and pushes the voxel
+  // against its own load, or the link lets the voxel move neither way. Drops what was found before.
   void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> sources,
               int axis) noexcept;
   // Finds, on one axis, all dependents of a rigid block. The load of a voxel in another block is the load of

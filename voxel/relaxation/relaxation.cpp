@@ -18,10 +18,10 @@ constexpr double kMeasured = 0.5;
 // diverge.
 constexpr float kFarthest = 2.0F;
 constexpr std::uint64_t kPatient = 200'000;  // voxel updates per call; a tick has a smaller budget
-// Margin of cells around a contact that are smoothed on each level: in a contact cycle; in a cycle on a large
-// patch.
+// Margin, in cells, around a contact that is smoothed on each level: in a contact cycle, and in a cycle on a
+// large patch.
 constexpr int kContactMargin = 3, kLargePatchMargin = 14;
-// Margin of cells around a contact that get corrections after a jump.
+// Margin, in cells, around a contact that gets corrections after a jump.
 constexpr int kProlongedMargin = 24;
 constexpr int kNear = 2;                     // rows that a contact cycle reads around those it relaxes
 constexpr std::uint64_t kBesideContact = 2;  // the budget is divided by this if a contact cycle ran
@@ -108,7 +108,7 @@ void Relaxation::mark_all_dirty() noexcept {
   }
 }
 
-// Held voxels are fixed; pressed voxels slide and are fixed along the tool's normal.
+// Fixes held voxels on all axes, and pressed voxels along the tool's normal only: they slide.
 void Relaxation::fix_held_voxels(const Displacement& state, std::span<const VoxelId> held) noexcept {
   standing_.clear();
   bool others_hold = false;

@@ -41,15 +41,15 @@ class Relaxation {
   // object is at rest. Returns the updates spent.
   std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                     std::uint64_t budget) noexcept;
-  // One cycle over the whole object. For references, not for the tick.
+  // Runs one cycle over the whole object. For references, not for the tick.
   void run_cycle(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held) noexcept;
-  // One cycle around the contact, which is the box of `pressed`. `pressed` is not empty and a part of `held`.
-  // If the contact is wider than kMaxNear voxels, the cycle covers its middle only; whole cycles relax the
-  // rest. `again`: another contact cycle has just ended. Under asynchronous relaxation this cycle then skips
-  // smoothing on the way to the coarse levels, which is cheaper and moves far tissue more. Returns the
-  // counted work: the number of Float8 whose prolongation would cost as much (about 45 ns each). If a cycle
-  // around a large patch costs more than `at_once`, only a part of it is done, and continue_contact() does
-  // the rest.
+  // Runs one cycle around the contact, which is the bounding box of `pressed`. `pressed` must be a non-empty
+  // part of `held`. If the contact is wider than kMaxNear voxels, the cycle covers its middle only; whole
+  // cycles relax the rest. `again`: another contact cycle has just ended. Under asynchronous relaxation this
+  // cycle then skips smoothing on the way to the coarse levels, which is cheaper and moves far tissue more.
+  // Returns the counted work: the number of Float8 whose prolongation would cost as much (about 45 ns each).
+  // If a cycle around a large patch costs more than `at_once`, only a part of it is done, and
+  // continue_contact() does the rest.
   static constexpr int kMaxNear = 64;
   static constexpr std::size_t kUnlimited = ~std::size_t{0};
   std::size_t relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
@@ -63,7 +63,7 @@ class Relaxation {
   // A contact cycle has a large patch if it visits more than kSmallPatch Float8 on all levels together.
   // has_large_patch() tells whether the last or current contact cycle has one.
   static constexpr std::size_t kSmallPatch = 2500;
-  // Factor on kSmallPatch (0 to 1). A smaller one splits more cycles, for ticks that may do less work.
+  // Factor on kSmallPatch (0 to 1). A smaller factor splits more cycles, for ticks that may do less work.
   void set_small_patch_share(double share) noexcept { small_patch_share_ = share; }
   [[nodiscard]] bool has_large_patch() const { return large_patch_; }
   // Ends a cycle that is under way; pending corrections wait for the next one.
@@ -119,7 +119,7 @@ class Relaxation {
   [[nodiscard]] bool left_to_shadow() const { return left_to_shadow_; }
   // True while a submitted state is with the shadow.
   [[nodiscard]] bool shadow_busy() const { return shadow_busy_; }
-  // Call when the state was submitted to the shadow. Nothing is relaxed here until something moves. The
+  // Call when the state was submitted to the shadow. This Relaxation does nothing until something moves. The
   // residual near the contact is frozen, because the shadow owns it.
   void assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
@@ -236,7 +236,7 @@ class Relaxation {
                   Planes planes) noexcept;
   void prolong_box(int level, Displacement& state, const ObstacleView& obstacles, Planes planes) noexcept;
   bool mark_source_cells(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
-  // Coarse levels are relaxed to rest among themselves; voxels get the correction last and are not smoothed.
+  // Relaxes the coarse levels to rest among themselves. Voxels get the correction last and are not smoothed.
   void run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept;
   void run_steps_over(int first, int last, Displacement& state, const ObstacleView& obstacles,
                       Look look) noexcept {
@@ -266,7 +266,8 @@ class Relaxation {
   bool patient_ = false;                    // rounds may take longer than a tick
   std::int64_t credit_ = 0;                 // voxel updates left; negative: overspent
   std::size_t round_left_ = 0;              // tiles left in this round
-  // Search for tiles with a pending correction above them: the next tile, and tiles searched in vain.
+  // Search for tiles with a pending correction above them: the next tile, and the number of tiles searched in
+  // vain.
   std::size_t cursor_ = 0, looked_at_ = 0;
   RowId commit_row_ = 0;  // next row whose plastic offsets are to be committed
   bool asleep_ = true, shadow_busy_ = false;

@@ -68,7 +68,7 @@ struct FileFrame {
 };
 
 // Completes a frame whose file gives only the first `given` axes (0 to 3). The missing axes have one voxel.
-// They get directions at right angles to the others.
+// They get directions at right angles to the given axes.
 void complete_axes(FileFrame& frame, std::size_t given);
 
 // Checks the frame and fills the header's dims, spacing, origin, rotation, component and bytes. Throws
