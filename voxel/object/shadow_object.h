@@ -221,8 +221,7 @@ class ShadowObject {
   std::vector<Obstacle> obstacles_;
   std::size_t moving_obstacles_ = 0;
   std::vector<VoxelId> held_;
-  std::array<LazyArray<float>, 3>
-      before_;  // [axis][voxel] shadow's displacements as submitted, plus the changes packed since
+  std::array<LazyArray<float>, 3> before_;  // [axis][voxel] submitted displacement plus packed changes
   std::size_t work_ = 0;
   int coarse_first_left_ = 0;      // results still to come with coarse levels first
   bool was_coarse_first_ = false;  // the last result had coarse levels first

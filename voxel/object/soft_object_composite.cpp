@@ -18,8 +18,7 @@ namespace {
 // Voxels of the finest patch beyond the contact. A wide tool has fewer, at least kLeastMargin, because more
 // would exceed the work of a tick.
 constexpr int kMargin = 6, kLeastMargin = 4;
-constexpr double kFelt =
-    0.3;  // fraction of the force; an axis with a smaller component is relaxed in every second tick
+constexpr double kFelt = 0.3;  // fraction of the force; an axis with less is relaxed in every second tick
 constexpr std::uint32_t kAllAxes = 4;  // number of cycles at the start of a contact that relax all axes
 // In spacings. A voxel no further than kPressed from the tool is pressed. Tissue on its way back is still
 // felt up to a distance of kOnItsWay.
