@@ -183,7 +183,7 @@ void ThesisChainMail::spread() {
       return;
     }
     const std::uint32_t entry = queue_[head_];
-    // Prefetches a later candidate; beyond the end of the queue a stale one, which is harmless.
+    // Prefetches a later candidate. Beyond the end of the queue this is a stale entry, which is harmless.
     __builtin_prefetch(&elements_[queue_[(head_ + kPrefetchCandidates) & (queue_.size() - 1)] >> 3U]);
     head_ = (head_ + 1) & (queue_.size() - 1);
     ++candidates_;

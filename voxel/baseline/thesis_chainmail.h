@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`; sessions do not use it.
 //
-// Its parts are ChainMail by a first-come queue of candidates with their sponsors (Figs 6 to 9), contact by a
-// point and six directions on a dense occupancy map (Fig 16), a force from the lines of links through the
-// touched element (getForce), and a relaxation in which each element moves as its links require, damped or
-// not. The implementation is efficient: dense arrays, 16 bytes per element, a queue that stops allocating
-// once it has grown. In two respects it differs from the thesis, so that neither rounding nor units count
-// against it: it stores displacements from rest instead of absolute positions, and its springs have the
-// moduli of `Lattice`. (Springs on a border are whole ones, as in the thesis; `Lattice` halves them.)
+// It has four parts. ChainMail uses a first-come queue of candidates with their sponsors (Figs 6 to 9).
+// Contact tests a point and six directions on a dense occupancy map (Fig 16). The force comes from the three
+// lines of links through the touched element (getForce). In relaxation each element moves as its links
+// require, damped or not. The implementation is efficient: dense arrays, 16 bytes per element, a queue that
+// stops allocating once it has grown. In two respects it differs from the thesis, so that neither rounding
+// nor units count against it: it stores displacements from rest instead of absolute positions, and its
+// springs have the moduli of `Lattice`. (Springs on a border are whole ones, as in the thesis; `Lattice`
+// halves them.)
 #pragma once
 
 #include <array>
@@ -27,7 +28,7 @@ struct ThesisChainMailOptions {
   // stiffness. `sum`: by the sum of the moves that its links require, as in the thesis's first version (Fig
   // 22).
   enum class Movement : std::uint8_t { mean, sum } movement = Movement::mean;
-  double damping = 1.0;    // factor on that movement; 1: undamped. The thesis's remedy is "some small value"
+  double damping = 1.0;    // factor on the movement; 1: undamped. The thesis recommends "some small value"
   bool six_points = true;  // false: the tool is a point (the thesis before Figs 20 and 21)
   bool lock = false;       // locks the object for each element that is visited (Fig 23)
 };
@@ -56,7 +57,7 @@ class ThesisChainMail {
   // candidates. The queue may grow, and so allocate. Incompatible sources would push one another endlessly:
   // after kMaxRounds candidates per cell and direction the rest is dropped, and gave_up() is true.
   void move(std::span<const ElementId> sources, std::span<const glm::vec3> moves);
-  // Of the last move().
+  // Results of the last move(): number of candidates; were candidates dropped?
   [[nodiscard]] std::uint64_t candidates() const { return candidates_; }
   [[nodiscard]] bool gave_up() const { return gave_up_; }
   static constexpr std::uint64_t kMaxRounds = 20;

@@ -7,10 +7,10 @@
 // computed again at the new displacements: u ← u − ω·K_links⁻¹·K_bricks·u. The fixed point is the equilibrium
 // of the bricks and does not depend on the links. `largest_ratio` bounds the stiffness of a cell's bricks
 // relative to its links, and so bounds ω. A momentum term carries a part of each step on to the next (Polyak
-// 1964). A smoother and coarse levels of bricks would need 27 blocks of 3×3 per voxel in every pass, and a
-// limit per axis would no longer be a limit of one unknown.
+// 1964). The solver does not relax the bricks themselves: their smoother and coarse levels would need 27
+// blocks of 3×3 per voxel in every pass, and a limit per axis would no longer be a limit of one unknown.
 //
-// A tick feels the links at once. The correction follows over the next ticks.
+// The links respond to the tool within the same tick. The correction follows over the next ticks.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ class BrickLoads {
  public:
   explicit BrickLoads(const Lattice& lattice);
 
-  // Are there loads that this object renews? False without bricks and after leave_to_shadow().
+  // True if there are loads that this object renews. False without bricks and after leave_to_shadow().
   [[nodiscard]] bool any() const { return share_ > 0.0F; }
   void leave_to_shadow() noexcept { share_ = 0.0F; }
   // Loads whose error is at most `least_N` are not renewed.
@@ -63,7 +63,7 @@ class BrickLoads {
     if (changed) mark_[row] &= static_cast<std::uint8_t>(~kChanged);
     return changed;
   }
-  // Every row that was due when the last round began has been examined.
+  // True if every row that was due when the last round began has been examined.
   [[nodiscard]] bool round_ended() const { return next_ == due_.count; }
   // Largest error of a load in the last complete round (N).
   [[nodiscard]] float unbalanced_N() const { return left_N_; }
@@ -108,7 +108,7 @@ class BrickLoads {
   float least_N_ = 0.0F, left_N_ = 0.0F, worst_N_ = 0.0F;
   float calm_ = 1.0F;             // factor of share_ and carry_on_; falls while rounds make no progress
   float least_left_N_ = 0.0F;     // least left_N_ since the error last grew by kElsewhere
-  int without_gain_ = 0;          // rounds
+  int without_gain_ = 0;          // number of rounds without progress
   LazyArray<std::uint8_t> mark_;  // [row]
   Rows moved_, due_, retry_;      // retry_: rows that this round changed
   std::size_t next_ = 0;          // index of the next row in due_

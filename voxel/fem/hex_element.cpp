@@ -109,7 +109,7 @@ BrickStiffness brick_stiffness(double young_Pa, double poisson, const glm::dvec3
   corners -= mixed * modes.ldlt().solve(mixed.transpose());
 
   BrickStiffness out;
-  // Symmetrises: rounding leaves the two halves slightly different.
+  // Symmetrises: rounding leaves the upper and lower triangle slightly different.
   const Eigen::Matrix<double, 24, 24> symmetric = 0.5 * young_Pa * unit * (corners + corners.transpose());
   std::copy_n(symmetric.data(), symmetric.size(), out.entry.begin());
   return out;

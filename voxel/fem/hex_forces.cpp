@@ -126,7 +126,8 @@ std::array<float, 3> node_force(const std::array<const BrickFloats*, 8>& bricks,
   for (std::size_t octant = 0; octant < 8; ++octant) {
     if (bricks[octant] == nullptr) continue;
     const auto number = [](std::size_t bits) { return (bits & 1) + 3 * (bits >> 1 & 1) + 9 * (bits >> 2); };
-    // The matrix is symmetric. So a column of the node's three rows is contiguous, as a part of a row.
+    // The matrix is symmetric. So the entries of a column in the node's three rows are contiguous in memory,
+    // as a part of a row.
     const float* rows = bricks[octant]->data() + 3 * (7 - octant);
     for (std::size_t corner = 0; corner < 8; ++corner) {
       const float* from = d.data() + 3 * (number(octant) + number(corner));

@@ -33,8 +33,7 @@ void row_forces(const NodeStencil& inside, const NodeField& field, std::size_t f
 using BrickFloats = std::array<float, 580>;  // 24 × 24, padded for the last vector load
 [[nodiscard]] BrickFloats in_floats(const BrickStiffness& brick);
 
-// The same force (N) from the bricks around the node, by the octants of BricksAround; null for a missing
-// brick.
+// Force on one node (N) from the bricks around it, by the octants of BricksAround; null for a missing brick.
 [[nodiscard]] std::array<float, 3> node_force(const std::array<const BrickFloats*, 8>& bricks,
                                               const NodeField& field, std::size_t node);
 

@@ -53,8 +53,8 @@ struct Displacement {
     held = 1,      // near the tool or another soft object: moved by the contact solver only
     obstacle = 2,  // near a rigid surface: also subject to n·u >= bound
     pressed = 3,   // on the tool only: slides along the tool's surface (tangential_contact.h)
-    // In a block without slack (rigid_blocks.h): moves with its block only, whatever else touches it. Voxels
-    // keep this role from construction on. The second value marks those near a rigid surface.
+    // In a block without slack (rigid_blocks.h): moves with its block only, even if something touches it.
+    // Voxels keep this role from construction on. The second value marks those near a rigid surface.
     joined = 5,
     joined_at_obstacle = 7,
   };
@@ -82,7 +82,7 @@ struct Displacement {
 
   std::array<LazyArray<float>, 3> u;                    // [axis][v] (unit: meter)
   LazyArray<std::uint8_t> role;                         // [v]
-  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row] voxels that stand; voxels at obstacles
+  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row] number with stands(), at_obstacle()
   LazyArray<glm::vec3> tool_normal;  // [surface number] unit, out of the tool; for pressed voxels
   PlasticOffsets plastic;
   BrickLoad bricks;
@@ -125,7 +125,8 @@ struct Displacement {
 // A voxel touches its obstacle if it is no deeper in the obstacle than this share of the smallest spacing.
 inline constexpr double kTouching = 1e-6;
 
-// A half-space that one surface voxel may not leave: normal · u >= bound, u its displacement.
+// A half-space that one surface voxel may not leave: normal · u >= bound, where u is the voxel's
+// displacement.
 struct Obstacle {
   glm::vec3 normal{0.0F};
   float bound = 0.0F;  // (m); <= 0 if the voxel at rest is outside the obstacle

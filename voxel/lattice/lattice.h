@@ -91,7 +91,8 @@ class Lattice {
   // Throws std::invalid_argument with a message for the user: no voxel, no anchor (a free object has no
   // equilibrium force), a material out of range, more than 2^31 cells.
   Lattice(const LabelVolume& volume, const LatticeOptions& options);
-  // The same, but returns the volume's memory to the system while reading it and leaves the volume empty.
+  // Builds the same lattice, but returns the volume's memory to the system while reading it and leaves the
+  // volume empty.
   Lattice(LabelVolume&& volume, const LatticeOptions& options);
 
   [[nodiscard]] const Grid& grid() const { return grid_; }
@@ -210,7 +211,7 @@ class Lattice {
   enum class Anchors : std::uint8_t { none = 0, all = 1, some = 2 };
   static constexpr std::uint8_t kCount = 63, kInside = kRow + 1;
   static constexpr int kAnchorShift = 6;
-  static constexpr std::size_t kListBlock = 64;  // rows to an entry of listed_before_
+  static constexpr std::size_t kListBlock = 64;  // rows per entry of listed_before_
   [[nodiscard]] Anchors anchors_of(RowId row) const { return Anchors(rows_[row] >> kAnchorShift); }
   // Anchored lanes of a row with Anchors::some.
   [[nodiscard]] std::uint32_t listed_anchors(RowId row) const noexcept;

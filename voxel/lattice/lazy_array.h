@@ -67,7 +67,7 @@ class LazyArray {
 
   // Touches every page now, so that a tick does not pay for the page faults (about a microsecond each).
   void populate() noexcept;
-  // The same for chunks: chunk n, values n·each to (n + 1)·each − 1, is touched if wanted[n]. Values on the
+  // Touches some chunks only: chunk n (values n·each to (n + 1)·each − 1) if wanted[n] is true. Values on the
   // same pages are touched too.
   void populate(std::size_t each, const std::vector<bool>& wanted) noexcept;
   // Bytes of pages that were written so far; pages that were only read take no memory.

@@ -145,9 +145,10 @@ class LevelStiffness {
   }
   // Limits of a prepared row of level 0.
   [[nodiscard]] RowLimits limits(RowId row) const noexcept;
-  // Springs of one voxel or cell on all axes. Prepares its row; afterwards it takes a few loads.
+  // Springs of one voxel or cell on all axes. Prepares its row; for a prepared row it takes a few loads only.
   [[nodiscard]] VoxelSprings springs_of(VoxelId cell) noexcept;
-  // The same springs to the last bit, but without preparing the row; slower if the row is not prepared.
+  // Returns the springs of springs_of(), to the last bit, but does not prepare the row. Slower if the row is
+  // not prepared.
   [[nodiscard]] VoxelSprings find_springs(VoxelId cell) const noexcept;
   // Does this cell of the grid contain a voxel?
   [[nodiscard]] bool has_voxel(const std::array<int, 3>& cell) const noexcept {
@@ -223,13 +224,14 @@ class LevelStiffness {
   Grid grid_;
   LazyArray<std::uint8_t> kind_, label_;   // [row]
   LazyArray<std::uint8_t> content_;        // [cell], on levels from kKept on; empty on finer ones
-  std::array<LazyArray<Spring>, 3> link_;  // [d][cell], likewise: link to the upper neighbour
+  std::array<LazyArray<Spring>, 3> link_;  // [d][cell], on levels from kKept on: link to the upper neighbour
   LazyArray<std::uint32_t> written_at_;    // [row] into written_
   LazyArray<Written> written_;
-  LazyArray<Cells> written_cells_;  // as written_; empty on level 0
-  // As written_, but a separate array: corrections read only this part, so their reads stay together.
+  LazyArray<Cells> written_cells_;  // indexed as written_; empty on level 0
+  // Indexed as written_. A separate array, because corrections read only this part, and so their reads stay
+  // together.
   LazyArray<LaneBits> written_stands_;
-  LazyArray<RowLimits::Written> written_limits_;             // as written_; empty if all limits are alike
+  LazyArray<RowLimits::Written> written_limits_;  // indexed as written_; empty if all limits are alike
   std::array<std::array<AxisLimits, 3>, 256> label_limits_;  // [label][axis]
   std::uint32_t written_count_ = 0;
   // Rows with equal springs share one copy, found by a hash. Along a face or between layers thousands of rows

@@ -83,7 +83,7 @@ void LevelStiffness::write_lane(std::size_t i, const VoxelSprings& springs, Writ
 }
 
 bool LevelStiffness::write_voxels(RowId row, Written& out, LaneBits& stands) const noexcept {
-  // Materials around the row, [lane + 1][z][y]: the nine of one place along x are adjacent.
+  // Materials around the row, [lane + 1][z][y]: the nine with the same x are adjacent.
   using Slice = std::array<std::uint8_t, 9>;
   std::array<Slice, kRow + 2> around{};
   for (std::size_t n = 0; n < 9; ++n) {

@@ -2,10 +2,10 @@
 // The six-link energy: spring stiffness of a link.
 //
 // A link along d of length h_d has a spring of E·A/h_d along it and of G·A/h_d across it, where A is the
-// product of the two other spacings. A voxel is a node: an object, and a region of stiffer tissue within it,
-// ends at the centres of its outermost voxels. Around a link lie four cells of eight voxels, and the link
-// stands for a quarter of each. E and G are the means of the four quarters; a quarter is 0 if its cell lacks
-// a voxel.
+// product of the two other spacings. A voxel is a node. So an object ends at the centres of its outermost
+// voxels, and so does a region of stiffer tissue within it. Around a link lie four cells of eight voxels, and
+// the link stands for a quarter of each. E and G are the means of the four quarters; a quarter is 0 if its
+// cell lacks a voxel.
 #pragma once
 
 #include <array>
@@ -71,9 +71,9 @@ struct LinkModuli {
   return b.along_Pa < a.along_Pa ? b : a;
 }
 
-// Moduli of a link where materials meet, as a sum of two parts. `links[n]` has the moduli of parallel n: of
-// the softer of its two ends, 0 if an end is missing. In one material the sum is the material's moduli times
-// link_weight.
+// Moduli of a link where materials meet, as a sum of two parts. `links[n]` contains the moduli of the softer
+// of the two ends of parallel n; 0 if an end is missing. In one material the sum is the material's moduli
+// times link_weight.
 struct LinkParts {
   // Mean of the four quarters; a quarter has the moduli of the softest voxel of its cell. A rule by the
   // link's two ends in series would ignore the voxels beside the link.
@@ -110,7 +110,7 @@ struct LinkParts {
 }
 
 // Moduli for the springs beside the bricks of the accurate energy (voxel/fem/hex_element.h). Bricks replace
-// the cells; tissue too thin for a brick keeps its links. Both act on the same voxels.
+// the cells; tissue too thin for a brick keeps its links. Bricks and links act on the same voxels.
 [[nodiscard]] constexpr LinkModuli link_moduli_beside_bricks(const std::array<LinkModuli, 9>& links) {
   return link_parts(links).thin;
 }

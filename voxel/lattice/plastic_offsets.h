@@ -44,13 +44,13 @@ struct PlasticOffsets {
 };
 
 // Plastic load on a voxel at the present displacements (N, per axis). The loads of rows date from their last
-// renewal. A contact needs the present load: with the old one, a held tool and its tissue would keep reacting
-// to each other's last round and never come to rest.
+// renewal. A contact needs the present load: with the load of the last renewal, a held tool and its tissue
+// would keep reacting to each other and never come to rest.
 std::array<float, 3> plastic_load(const Lattice& lattice, const Displacement& state,
                                   const VoxelSprings& springs, VoxelId v) noexcept;
 
 struct RowPlasticity {
-  float moved_m = 0.0F;      // largest motion of a voxel of the row by the change of its load
+  float moved_m = 0.0F;      // largest motion of a voxel of the row that the change of the loads causes
   bool uncommitted = false;  // some link is beyond its yield, and its offset has not moved
 };
 

@@ -14,8 +14,8 @@
 
 namespace voxel {
 
-inline constexpr int kLanes = 8;                   // lanes
-inline constexpr int kLaneGroups = kRow / kLanes;  // in a row
+inline constexpr int kLanes = 8;                   // lanes of a vector
+inline constexpr int kLaneGroups = kRow / kLanes;  // lane groups of a row
 
 using Float8 = float __attribute__((vector_size(32)));
 using Mask8 = std::int32_t __attribute__((vector_size(32)));  // a lane is 0 or −1

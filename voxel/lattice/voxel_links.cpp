@@ -181,8 +181,8 @@ glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dve
 namespace {
 
 // Place of least energy within the intervals low … high and outside the obstacle. `wanted` is the minimum
-// without either; w is the compliance. The obstacle's multiplier grows from 0 and moves each axis at the rate
-// w·n, while that axis lies in its interval, until the place is outside. A projection that is clamped
+// without either; w is the compliance. The obstacle's multiplier grows from 0 until the place is outside.
+// Meanwhile each axis moves at the rate w·n as long as it lies in its interval. A projection that is clamped
 // afterwards would be wrong: an axis at its limit would not be compensated by the other axes.
 glm::dvec3 least_outside(const Obstacle& o, const glm::dvec3& w, const glm::dvec3& wanted,
                          const glm::dvec3& low, const glm::dvec3& high) noexcept {
@@ -232,8 +232,8 @@ void relax_obstacle(LevelStiffness& couplings, Displacement& state, const Obstac
         depth > 0.0 && denominator > 0.0 ? wanted + (depth / denominator) * w * n : wanted;
     const glm::dvec3 within = clamp_to_links(couplings.lattice(), state, v, projected);
     const double now = depth_in_obstacle(o, before);
-    // If limits keep a voxel inside the obstacle from its projection, the minimum within limits and obstacle
-    // is computed below. Otherwise the voxel would never move again.
+    // If limits keep a voxel that is inside the obstacle from reaching its projection, the minimum within
+    // limits and obstacle is computed below. Otherwise the voxel would never move again.
     if (now <= kTouching * couplings.lattice().min_spacing_m() || depth_in_obstacle(o, within) <= now) {
       state.set(v, no_deeper(o, before, within));
       return;

@@ -29,7 +29,7 @@ float clamp_to(const std::array<float, 2>& interval, float wanted, float now) no
 // for references.
 glm::dvec3 link_force(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept;
 glm::dvec3 link_force(const Lattice& lattice, const Displacement& state, VoxelId v) noexcept;
-// The same along one axis, which is cheaper.
+// Component of link_force() along one axis, which is cheaper.
 double link_force(LevelStiffness& couplings, const Displacement& state, VoxelId v, int axis) noexcept;
 // Motion of voxel v by a force of 1 N on it, with its neighbours fixed, per axis (m/N); 0 if v is anchored.
 glm::dvec3 link_compliance(LevelStiffness& couplings, VoxelId v) noexcept;
@@ -40,7 +40,7 @@ struct VoxelLinks {
   std::array<std::array<float, 2>, 3> interval{};  // link_interval(), [axis]
 };
 VoxelLinks links_of(LevelStiffness& couplings, const Displacement& state, VoxelId v) noexcept;
-// As clamp_to_links() above, with the intervals of `links`; `now` is the present displacement.
+// Like clamp_to_links() above, but with the intervals of `links`; `now` is the present displacement.
 glm::dvec3 clamp_to_links(const VoxelLinks& links, const glm::dvec3& wanted, const glm::dvec3& now) noexcept;
 
 struct ObstacleView {

@@ -18,14 +18,14 @@ namespace voxel {
 
 namespace {
 
-// Of the spacing: a contact nearer to equilibrium is left to the background.
+// Fraction of the spacing. A contact nearer to equilibrium than this is left to the background.
 constexpr double kSettled = 2e-3;
-// Factor by which a contact cycle reduces that distance.
+// Factor by which a contact cycle reduces the contact's distance from equilibrium.
 constexpr double kContraction = 0.5;
 // Contact cycles a tick, at most.
 constexpr int kMostCycles = 2;
-// With a large patch a tick has one cycle, unless the contact is still this many spacings from equilibrium: a
-// second cycle gains little there and exceeds the time of a tick.
+// In spacings. With a large patch a tick has one cycle only, because a second one gains little and exceeds
+// the time of a tick. A second cycle runs if the contact is still further than this from equilibrium.
 constexpr double kJump = 0.1;
 // Counted work (Float8 prolonged) that a tick may spend on split cycles under asynchronous relaxation. A
 // cycle that is not finished continues in the next tick. If a cycle ends and at least kLeastWork is left of
@@ -38,10 +38,10 @@ constexpr std::size_t kTickWork = 4900;
 // allowed.
 constexpr int kColdTicks = 5;
 constexpr std::size_t kColdWork = 2500;
-// Rows of coarse cells. If at least as many are to be dropped, a separate tick drops them.
+// Rows of coarse cells. If at least this many are to be dropped, a separate tick drops them.
 constexpr std::size_t kDropsApart = 100;
-constexpr double kDeep = 0.05;  // of the voxel radius: a smaller depth at the start of a tick is an error of
-                                // the solver and is corrected
+constexpr double kDeep = 0.05;  // fraction of the voxel radius; a smaller depth at the start of a tick is an
+                                // error of the solver and is corrected
 
 }  // namespace
 
@@ -91,7 +91,8 @@ bool SoftObject::cycle_due() const noexcept {
   // enough work.
   if (cycles_since_touch_ > 0)
     return apart ? in_parts && left_of(kContactWork) >= shared(kLeastWork) : !split_cycle_;
-  // Tissue that was just released gets a cycle even then: it has this tick only.
+  // Tissue that was just released gets a cycle even if this tick skips cycles: pressed_last_ lists it in this
+  // tick only.
   return !skips_cycle_ || !any_pressed();
 }
 
@@ -123,7 +124,7 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
       split_cycle_ = true;
       continue;
     }
-    // Tissue that the tool just released follows the tool by one cycle here. The shadow alone would let
+    // One cycle here lets tissue that the tool just released follow the tool. The shadow alone would let
     // tissue lag behind a quick stroke, and the contact would be lost.
     if (pressed_last_.empty()) continue;
     const bool in_parts = relaxation_.left_to_shadow() && pressed > 0;
@@ -131,8 +132,9 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
                                                in_parts ? left : Relaxation::kUnlimited);
     split_cycle_ = relaxation_.has_large_patch();
   }
-  // This comes last, so that the reaction is measured with all voxels at their projections. Pressed voxels
-  // come first: a dependent counts only if its link to a pressed voxel is at its limit then.
+  // All touches are projected once more at the end, so that the reaction is measured with all voxels at their
+  // projections. Pressed voxels come first: a dependent counts only if its link to a pressed voxel is at its
+  // limit when the reaction is measured.
   for (const bool pressed : {true, false}) {
     for (Touch& t : touches_) {
       if (t.pressed == pressed) relax_touch(tool, t);

@@ -8,12 +8,12 @@
 namespace voxel {
 namespace {
 
-constexpr double kHeld = 1.0 / 3.0;  // of force times depth: least energy that a contact stores
-constexpr double kLetGo = 0.97;      // of the stored energy: if less was given, the force is scaled down
-constexpr double kLeast = 0.8;       // lower bound of the share, because work may be counted wrongly
-constexpr double kStands = 1e-5;     // of the stored energy: with less work in a tick the tool is at rest
-constexpr double kComesBack = 0.02;  // part of the missing share that returns in a tick at rest
-constexpr double kRegained = 0.1;    // of the stored energy: work that restores half of the missing share
+constexpr double kHeld = 1.0 / 3.0;  // fraction of force times depth: least energy that a contact stores
+constexpr double kLetGo = 0.97;  // fraction of the stored energy; if less was given, the force is scaled down
+constexpr double kLeast = 0.8;   // lower bound of the share, because work may be counted wrongly
+constexpr double kStands = 1e-5;     // fraction of the stored energy; with less work in a tick the tool rests
+constexpr double kComesBack = 0.02;  // fraction of 1 − share that is restored in a tick at rest
+constexpr double kRegained = 0.1;    // fraction of the stored energy: work that restores half of 1 − share
 
 }  // namespace
 

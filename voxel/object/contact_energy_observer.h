@@ -3,13 +3,14 @@
 // (IEEE Trans. Robotics & Automation 18, 2002), for tissue whose force is only approximately the gradient of
 // an energy.
 //
-// On nested patches a path sideways may cost no force although the tissue is 1 % stiffer there. A tool that
-// enters at one place and leaves at another would gain that energy.
+// On nested patches a sideways motion may meet no force although it leads to tissue that is 1 % stiffer. A
+// tool that enters at the softer place and leaves at the stiffer one would then gain energy.
 //
-// A contact stores at least a third of force times depth (a third if active chain limits shape a cone, where
-// E ~ depth³; half without active limits). If the contact was given less, the force on the way out is scaled
-// by share(), which is at least 0.8. The lower bound is needed because work is counted wrongly where tissue
-// is stiffer than the tool's coupling. The share changes gradually, and returns to 1 while the tool rests.
+// A contact stores at least a third of force times depth. (It stores a third if active chain limits give the
+// dent the shape of a cone, where E ~ depth³, and half without active limits.) If the contact was given less,
+// the force on the way out is scaled by share(), which is at least 0.8. The lower bound is needed because
+// work is counted wrongly where tissue is stiffer than the tool's coupling. The share changes gradually, and
+// returns to 1 while the tool rests.
 #pragma once
 
 #include <glm/vec3.hpp>

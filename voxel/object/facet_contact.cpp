@@ -11,27 +11,28 @@
 namespace voxel {
 namespace {
 
-// Length of the difference of both outward normals: less means that the surfaces face the same way.
+// Least length of the difference of the two outward normals. If it is shorter, the surfaces face the same
+// way.
 constexpr double kLeastSide = 0.1;
 // Least component of a facet's unit normal along the axis. A steeper facet is pressed as if it were level.
 constexpr double kLeastAlong = 0.3;
-// Of the touching distance. A voxel over no facet is past the edge of the surface if the nearest voxel of the
-// surface is further away than this, across the axis.
+// Fraction of the touching distance. A voxel over no facet is past the edge of the surface if the surface's
+// nearest voxel is further away than this across the axis.
 constexpr double kBeside = 0.75;
-constexpr double kPushed = 1e-6;  // of the touching distance: less is rounding
-constexpr double kParted = 0.01;  // of the touching distance: less overlap is left to the next tick
-// kHollow, of the touching distance: a surface has a hollow if the place under the voxel is deeper than the
-// middle of the other facet by at least this. kFarBeside, barycentric: how far beside a facet a voxel may
-// still touch it.
+constexpr double kPushed = 1e-6;  // fraction of the touching distance; less is rounding
+constexpr double kParted = 0.01;  // fraction of the touching distance; less overlap is left to the next tick
+// kHollow: fraction of the touching distance. A surface has a hollow if the place under the voxel is deeper
+// than the middle of the other facet by at least this. kFarBeside: barycentric distance beside a facet at
+// which a voxel may still touch it.
 constexpr double kHollow = 0.005, kFarBeside = 0.5;
-constexpr double kNormalTurn =
-    0.01;                          // share by which the force direction turns to the facet's normal each time
-constexpr int kSteps = 4;          // steps over the surface in search of the facet
-constexpr double kInside = -1e-9;  // barycentric; less is outside
+constexpr double kNormalTurn = 0.01;  // fraction of the way to the facet's normal that the force direction
+                                      // turns at each update of the facet
+constexpr int kSteps = 4;             // steps over the surface in search of the facet
+constexpr double kInside = -1e-9;     // barycentric; less is outside
 constexpr VoxelId kNone = std::numeric_limits<VoxelId>::max();
 
 struct End {
-  glm::dvec3 u;           // displacement that links, dependents and the other pairs want
+  glm::dvec3 u;           // displacement at equilibrium with links, dependents and the other pairs
   glm::dvec3 compliance;  // per body axis (m/N); 0 at an anchor
 };
 
@@ -119,7 +120,7 @@ bool shares(const std::array<glm::dvec2, 3>& at, const glm::dvec2& p, std::array
 }
 
 void set_facet(const SoftObject& object, const std::array<VoxelId, 3>& facet, PressedPair& pair) noexcept {
-  if (facet == pair.facet) return;  // 0 is no voxel of any surface
+  if (facet == pair.facet) return;  // never true for the initial facet {0, 0, 0}: 0 is no surface voxel
   pair.facet = facet;
   for (std::size_t i = 0; i < 3; ++i) pair.number[i] = object.surface_number(facet[i]);
 }
@@ -222,7 +223,8 @@ void add_loads(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   });
 }
 
-// If the chain of one object left overlap, the other object yields by it and presses that much harder.
+// If the links of one object left overlap, the other object moves by this overlap. The pair's force grows
+// accordingly.
 void push_the_rest(const PosedObject& a, const PosedObject& b, PressedPair& pair, const End& first,
                    const std::array<End, 3>& corners, double yielding_a, double yielding_b) noexcept {
   const double least = kPushed * pair.reach_m;
@@ -257,10 +259,10 @@ bool shares_of(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   return shares(at, surface.flat(to_body(b, scene_position(a, pair.a))), out);
 }
 
-// With bricks a facet that is pushed sideways also moves up and down, and tilts the other way. If links are
-// at their limits in both objects, the force would flip between voxels in each tick. So the force direction
-// follows the facet's normal slowly. At rest the direction is the normal, and the gap along the axis does not
-// depend on the direction. Links alone couple no axes and need no such damping.
+// With bricks a facet that is pushed sideways also moves up and down, and its tilt may reverse. With links at
+// their limits in both objects, a force along the facet's normal would flip between voxels in each tick. So
+// the force direction follows the facet's normal slowly. At rest the direction is the normal, and the gap
+// along the axis does not depend on the direction. Links alone couple no axes and need no such damping.
 glm::dvec3 turned(const PosedObject& a, const PosedObject& b, const PressedPair& pair,
                   const glm::dvec3& across) noexcept {
   if (!a.object.lattice().has_bricks() && !b.object.lattice().has_bricks()) return across;
@@ -414,7 +416,7 @@ double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair)
   }
   a.object.move(pair.a, first.u);
   for_corners(pair, [&](VoxelId v, double, std::size_t i) { b.object.move(v, corners[i].u); });
-  // needed even without a force: links at their limits may keep the voxels from separating
+  // Needed even if the force is 0: links at their limits may keep the voxels from separating
   if (pair.over) push_the_rest(a, b, pair, first, corners, of_first, of_facet);
   return gap_of_pair(a, b, pair);
 }
@@ -428,8 +430,8 @@ bool part_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pa
   const double first = who == GiveWay::second ? 0.0 : of_first;
   const double second = who == GiveWay::first ? 0.0 : of_facet;
   if (!(first + second > 0.0)) return true;
-  // They part along the axis, so that the voxel stays over the facet. Along the normal the voxel would end up
-  // over the next facet, and inside of it.
+  // Voxel and facet part along the axis, so that the voxel stays over the facet. Along the normal the voxel
+  // would end up over the next facet, and inside of it.
   glm::dvec3 along(0.0);
   along[pair.axis] = pair.upwards ? -overlap : overlap;
   const glm::dvec3 in_scene = b.pose.rotation * along;

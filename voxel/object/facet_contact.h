@@ -37,8 +37,8 @@ struct PressedPair {
   bool over = false;               // a facet, or an edge nearby, is under the voxel
   std::array<VoxelId, 3> facet{};  // corners of the facet
   std::array<double, 3> share{};   // the voxel's barycentric coordinates: the corners' shares of the force
-  glm::dvec3 across{0.0};  // gradient of the overlap by the voxel's position, and of the distance by the
-                           // facet's (scene frame)
+  glm::dvec3 across{0.0};  // gradient of the overlap with respect to the voxel's position (scene frame); with
+                           // respect to the facet's position the gradient is the opposite
   double reach_m = 0.0;    // distance of voxel and facet in contact, along the axis
   // Derived from the members above, and kept until the facet is found anew: the gradient in both body frames,
   // the overlap of the surfaces at rest, and the surface numbers of voxel and corners.
@@ -48,8 +48,8 @@ struct PressedPair {
   std::array<std::uint32_t, 3> number{};
 };
 
-// A pair of a voxel of the first surface and one of the second that may touch. `side` is 0 if the two
-// surfaces face the same way, so that the order of the objects is unknown.
+// Makes a pair of two surface voxels that may touch, one of each object. `side` is 0 if the two surfaces face
+// the same way. Then it is unknown on which side of each other the objects are.
 [[nodiscard]] PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b,
                                   VoxelId in_b) noexcept;
 
@@ -75,16 +75,18 @@ void find_facet(const PosedObject& a, const PosedObject& b, PressedPair& pair) n
 void claim_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// Load of a pair on its voxels, as their objects know it. Before a round of relax_pair(): clear_pair_load()
-// on all pairs, then load_pair() once a pair, so that rounding errors do not accumulate.
+// Set the pair loads of the voxels (SoftObject::pair_load()) to 0, and add the load of a pair. Before a round
+// of relax_pair(): clear_pair_load() on all pairs, then load_pair() once a pair, so that rounding errors do
+// not accumulate.
 void clear_pair_load(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
-// One step of block Gauss-Seidel on a pair: its voxels move to the joint minimum of their link energies under
-// the loads of their other pairs, without overlap. Overlap is shared in proportion to compliance. At
-// equilibrium both objects press with equal and opposite force, also if several pairs share a voxel. Voxels
-// that have passed one another press as if they had not. Returns gap_of_pair() afterwards. It is negative if
-// chains leave too little room.
+// One step of block Gauss-Seidel on a pair: its voxels move to the joint minimum of their link energies
+// without overlap. The loads of their other pairs act on them. Where the two surfaces overlap before the
+// step, both move apart, in proportion to their compliance. At equilibrium both objects press with equal and
+// opposite force, also if several pairs share a voxel. A voxel that has passed through the facet is still
+// pressed back to its own side. Returns gap_of_pair() afterwards. It is negative if chains leave too little
+// room.
 double relax_pair(const PosedObject& a, const PosedObject& b, PressedPair& pair) noexcept;
 
 // Which object's voxels move.

@@ -19,9 +19,9 @@ constexpr std::size_t kMaxSearched = 500;
 
 // Largest number of dependents of voxels that obstacles or pairs press.
 constexpr std::size_t kMaxDependents = 3000;
-// As kAtLimit, at voxels that a body or another soft object presses. Dependents lag a little whenever these
-// voxels or the tool withdraw, and would be lost for a tick. At rest a voxel that is no dependent is balanced
-// and adds nothing.
+// Replaces kAtLimit at voxels that a body or another soft object presses. It is wider, because dependents lag
+// a little whenever these voxels or the tool withdraw, and would be lost for a tick. A voxel that is gathered
+// although it is no dependent does no harm: at rest its load is 0.
 constexpr float kAtLimitBesideOthers = 0.02F;
 // Difference u(w) − u(v) of two neighbours along d, and its limits. w may be on either side of v.
 struct LinkState {
@@ -67,7 +67,7 @@ bool any_may_be_tight(const Lattice& lattice, const Displacement& state, std::sp
   return false;
 }
 // Adds up loads from the last of `dependents` back to number `first`. A dependent adds its load to its
-// source. If the source is one of the first `first`, carries(source, load) is called for this. If the link
+// source. If the source is one of the first `first`, carries(source, load) is called to add it. If the link
 // cannot carry the load in that direction, drops(i) is called instead.
 template <class Dependents, class Drops, class Carries>
 void add_from_far_end(Dependents& dependents, std::size_t first, const Drops& drops, const Carries& carries) {
@@ -85,8 +85,8 @@ void add_from_far_end(Dependents& dependents, std::size_t first, const Drops& dr
 
 }  // namespace
 
-// Dependents follow pressed voxels that withdraw. They are felt only while their links are at a limit, and
-// the background may need many ticks to reach them.
+// Moves dependents along with pressed voxels that withdraw. Dependents are felt only while their links are at
+// a limit, and the background may need many ticks to move them.
 void SoftObject::move_followers() noexcept {
   limit_sources_.clear();
   for (const Touch& t : touches_) {
@@ -128,7 +128,7 @@ glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
   }
   for (int axis = 0; axis < 3; ++axis) {
     limit_reactions_.gather(relaxation_.couplings(), state_, limit_sources_, axis);
-    // Dependents move along with the mean motion of the pressed voxels that have any.
+    // Dependents move with the mean motion of the pressed voxels that have dependents.
     glm::dvec3 way(0.0);
     int tight = 0;
     for (const Gathered& c : gathered_) {
@@ -175,9 +175,9 @@ void SoftObject::add_stiffness_of_touches(int axis, const glm::dvec3& way, glm::
   }
 }
 
-// As gather_load(), for an object that other soft objects press. Their loads enter at the far end of the
-// chain and pass through voxels whose own links pull the other way. So all dependents are searched first, and
-// loads are added up from the far end.
+// Replaces gather_load() for an object that other soft objects press. The loads of these objects enter at the
+// far end of the chain and pass through voxels whose own links pull the other way. So all dependents are
+// searched first, and loads are added up from the far end.
 void SoftObject::gather_load_with_pairs(int axis) noexcept {
   gathered_.clear();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
@@ -206,7 +206,7 @@ void SoftObject::gather_load_with_pairs(int axis) noexcept {
       [&](std::size_t i, double load) { touches_[gathered_[i].touch].load[axis] += load; });
 }
 
-// As gather_load_with_pairs(), for voxels that a rigid surface or a pair presses.
+// Like gather_load_with_pairs(), but for voxels that a rigid surface or a pair presses.
 void SoftObject::add_dependents(int axis, std::span<const VoxelId> pressed,
                                 std::span<ContactLoad> loads) noexcept {
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
@@ -326,9 +326,9 @@ void SoftObject::find_pair_dependents() noexcept {
     forget_pair_dependents();
 }
 
-// If a link at its limit carries a source's load, the multiplier is assigned to the voxel at its other end,
-// provided that pairs press that voxel harder. Beside the hardest contact pairs often press less than links
-// pull, and these loads would be lost.
+// If a link at its limit carries a source's load, the multiplier is assigned to the voxel at the link's other
+// end, provided that pairs press that voxel harder. Near the hardest contact, pairs often press less than
+// links pull. Without this assignment their loads would be lost.
 void SoftObject::reassign_multiplier(int axis) noexcept {
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   for (std::size_t i = pair_sources_.size(); i-- > 1;) {
@@ -351,8 +351,8 @@ void SoftObject::reassign_multiplier(int axis) noexcept {
   }
 }
 
-// Marks are reset. If they held the number of the gathering instead, a 32-bit number would wrap after four
-// days of contact, and every voxel ever gathered would count as gathered.
+// Resets all marks to 0. Marks with the number of the search would not need a reset. But a 32-bit number
+// would wrap after four days of contact, and then every voxel ever gathered would count as gathered.
 void SoftObject::clear_gathered() noexcept {
   for (const Gathered& c : gathered_) gathered_mark_[c.v] = 0;
   gathered_.clear();

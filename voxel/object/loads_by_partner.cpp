@@ -16,8 +16,8 @@
 namespace voxel {
 namespace {
 
-// Of the spacing: a link nearer to a limit is taken to be at it. Voxels that are tied without need add loads
-// that balance at rest; a tie that is missed loses a load.
+// Fraction of the spacing. A link nearer to a limit counts as being at the limit. A false tie does no harm,
+// because the loads that it adds balance at rest. A missed tie would lose a load.
 constexpr float kTied = 0.02F;
 
 using PartnerSet = std::uint64_t;  // bit n: partner n

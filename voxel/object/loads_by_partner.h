@@ -17,7 +17,7 @@ namespace voxel {
 inline constexpr std::uint32_t kHandPartner = 0, kAnchorPartner = 1, kFirstRigidPartner = 2;
 inline constexpr std::size_t kMostPartners = 64;
 
-// A voxel that a partner keeps from moving as its links pull.
+// A voxel that a partner holds against the pull of the voxel's links.
 struct HeldVoxel {
   VoxelId v = 0;
   std::uint32_t partner = kHandPartner;
@@ -25,8 +25,8 @@ struct HeldVoxel {
 
 struct PartnerLoad {
   glm::dvec3 force_N{0.0};  // of the partner on the object (body frame)
-  // False: links at their limits tie the partner to another one, or to more voxels than are searched.
-  // Displacements do not tell then how the load is divided.
+  // False if links at their limits tie the partner to another partner, or to more voxels than are searched.
+  // Then the displacements do not determine how the load is divided.
   bool known = true;
   bool through_limits = false;  // links at their limits may carry a part of the load
 };

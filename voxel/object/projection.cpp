@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Constrained projection of one touched voxel, all others fixed: the least energy of its links outside of the
-// tool and of its obstacle, within its limits.
+// Constrained projection of one touched voxel: the displacement of least link energy outside of the tool and
+// of the obstacle, within the links' limits. All other voxels are fixed.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -12,14 +12,14 @@
 namespace voxel {
 namespace {
 
-// Projections onto the tool in search of the least energy.
+// Number of projections onto the tool in the search for the least energy.
 constexpr int kProjections = 3;
 constexpr double kSlides = 0.1;  // sin² of the angle between tool and obstacle; a voxel between nearly
                                  // parallel surfaces is squeezed and does not slide
 
 // The least force along the normal (N) that brings the voxel to normal · u >= bound. `wished`: displacement
 // without a force. `way`: motion by 1 N (m); no component is opposite to the normal's. Each axis is clamped
-// to its links' interval. If no force is enough: the force at which no axis moves any further.
+// to its links' interval. If no force is enough, returns the force at which no axis moves any further.
 double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const glm::dvec3& way,
                      const glm::dvec3& normal, double bound) {
   constexpr double kNoBound = std::numeric_limits<double>::infinity();
@@ -79,10 +79,10 @@ glm::dvec3 SoftObject::clamp_depth_in_tool(const ToolInBody& tool, const glm::dv
   return to;
 }
 
-// As project_on_tool(), for links that do not allow that place: the least energy on the tool within their
-// limits. For a given force of the tool the axes are independent. Projecting first and clamping afterwards
-// would leave the voxel off the tool or inside of it, and the next tick would push it out with its
-// dependents.
+// Replaces project_on_tool() where links do not allow its result. Finds the least energy on the tool's
+// surface within the links' limits. For a given force of the tool the axes are independent. Projecting first
+// and clamping afterwards would leave the voxel off the tool or inside of it, and the next tick would push it
+// out with its dependents.
 glm::dvec3 SoftObject::project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
                                                      const glm::dvec3& wished, Touch& t) const noexcept {
   const glm::dvec3 now = state_.at(t.v);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tool on rigid blocks (components without slack). A block is one body of three unknowns. It is pressed
-// if any of its voxels is pressed. It presses back with the sum of all loads on it. Block numbers in Lattice
-// begin with 1, those in RigidBlocks with 0.
+// Contact of the tool with rigid blocks (components without slack). A block is one body of three unknowns. It
+// is pressed if any of its voxels is pressed. It presses back with the sum of all loads on it. Block numbers
+// in Lattice begin with 1, those in RigidBlocks with 0.
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -12,7 +12,7 @@
 namespace voxel {
 namespace {
 
-// As kAtLimit, for links of dependents, which lag a little as the tool withdraws.
+// Replaces kAtLimit for links of dependents, which lag a little as the tool withdraws.
 constexpr double kAtLimitLagging = 1e-3;
 
 }  // namespace
@@ -136,9 +136,10 @@ glm::dvec3 SoftObject::dependents_of_block(std::size_t block,
   return force;
 }
 
-// As gather_load_with_pairs(), with each block as one voxel that is loaded as a whole. The load of a single
-// voxel of a block does not say which way the block passes it on: tissue at its limits between the tool and
-// an inclusion is pulled down and still carries the inclusion's load upwards.
+// Like gather_load_with_pairs(), but treats each block as one voxel that is loaded as a whole. The load of a
+// single voxel of a block does not show the direction in which the block passes load on. For example, tissue
+// at its limits between the tool and an inclusion is pulled down, and still carries the inclusion's load
+// upwards.
 void SoftObject::gather_load_with_blocks(int axis) noexcept {
   const Multigrid& grid = relaxation_.multigrid();
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
@@ -184,8 +185,8 @@ void SoftObject::gather_load_with_blocks(int axis) noexcept {
       look_at(head, v, up ? lattice_->up(v, n / 2) : lattice_->down(v, n / 2), n / 2, up);
     }
   }
-  // A voxel that pulls away from its source may rest on another gathered one; then it counts, too. The sum
-  // does not depend on the link through which its load passes.
+  // A voxel that pulls away from its source may rest on another gathered voxel. Then its load counts, too.
+  // The sum does not depend on the link through which the load passes.
   const auto rests = [&](std::size_t i) {
     const VoxelId v = gathered_[i].v, by = gathered_[dependents_[i].from].v;
     for (int n = 0; n < 6 && lattice_->block(v) == 0; ++n) {

@@ -13,11 +13,11 @@ namespace {
 
 // Rows near the contact that a tick applies at once, at most. If a contact has more rows, steps are felt.
 constexpr std::size_t kMaxAtOnce = 1000;
-// A whole cycle reduces the error at the contact only a little. So kContactCycles contact cycles follow it,
-// while the tool moves by more than kMoved spacings from one result to the next, and for kUnsettled results
-// after that. They do not follow it at rest: coarse cells outside of the contact cycles' boxes learn of the
-// whole cycle's last sweeps only in the next cycle. A voxel that barely touches the tool would then be
-// released and pressed in turns.
+// A whole cycle reduces the error at the contact only a little. So kContactCycles contact cycles follow it in
+// the next kUnsettled results after the tool moved by more than kMoved spacings between two submissions. At
+// rest no contact cycles follow. Coarse cells outside of their boxes would receive the last sweeps of the
+// whole cycle only in the next cycle. So a voxel that barely touches the tool would be released and pressed
+// in turns.
 constexpr int kContactCycles = 4, kUnsettled = 4;
 // Cycles around a pressed rigid block that follow the whole cycle, too.
 constexpr int kBlockCycles = 4;
@@ -29,9 +29,9 @@ constexpr float kFarther = 20.0F;
 constexpr std::size_t kNearRows = 3;
 // If tissue moved by more than kJumped spacings since the last submission, the next kCoarseFirstResults
 // results are of contact cycles on large boxes. In the first of them, coarse levels come to rest before the
-// finer ones. They are also prolonged beyond the boxes: tissue left behind there would hold back the contact.
-// A pressed rigid block has one such result over the whole object, because no box is large enough. Loads of
-// bricks are not renewed meanwhile: they are of little use on tissue that moves far.
+// finer ones. Their corrections are also prolonged beyond the boxes: tissue left behind there would hold back
+// the contact. A pressed rigid block has one such result over the whole object, because no box is large
+// enough. Loads of bricks are not renewed meanwhile: they are of little use on tissue that moves far.
 constexpr float kJumped = 5.0F;
 constexpr int kCoarseFirstResults = 3;
 constexpr std::array<int, kCoarseFirstResults> kLargePatchCycles{3, 4, 2};
@@ -62,7 +62,7 @@ ShadowObject::ShadowObject(SoftObject& object)
   multigrid().keep_log();
   relaxation_.copy_from(object.relaxation_);
   object.relaxation_.leave_to_shadow();
-  // A rigid block sums the errors of all its border.
+  // With rigid blocks the limit is smaller, because a block sums the errors along its whole border.
   least_m_ = multigrid().has_blocks() ? multigrid().restricted_m() : multigrid().motion_tolerance_m();
   const std::size_t most_held = lattice_.surface().size() + SoftObject::kMaxTouched;
   held_.reserve(most_held);
@@ -96,7 +96,8 @@ void ShadowObject::submit(SoftObject& object) noexcept {
     for (std::size_t axis = 0; axis < 3; ++axis)
       std::copy_n(object.state_.u[axis].data() + at(row), kRow, to + axis * kRow);
     // The row is submitted as it will be when the result is applied. Otherwise it would differ from its
-    // neighbours by motion that the shadow knows already, and would make that motion twice.
+    // neighbours by motion that the shadow has already computed, and the shadow would compute that motion
+    // twice.
     const std::size_t n = delta.find(row);
     if (n == delta.count() || (n < rows_applied_ && !retry_.waits(n))) continue;
     for (std::size_t i = 0; i < std::size_t{3} * kRow; ++i) to[i] += delta.values(n)[i];
@@ -165,7 +166,7 @@ void ShadowObject::read_submission() noexcept {
   }
   if (submitted_.count() > 0 || !submitted_obstacles_.empty()) relaxation_.wake();
   to.log().clear();
-  // At least one whole cycle runs between two jumps, so that the rest of the object has its turn.
+  // At least one whole cycle runs between two jumps, so that the rest of the object is relaxed, too.
   if (moved_m > kJumped * static_cast<float>(lattice_.min_spacing_m()) && coarse_first_left_ == 0 &&
       !was_coarse_first_) {
     coarse_first_left_ = kCoarseFirstResults;
@@ -197,8 +198,8 @@ void ShadowObject::relax_coarse_first(const ObstacleView& obstacles) noexcept {
       kLargePatchCycles[static_cast<std::size_t>(kCoarseFirstResults - 1 - coarse_first_left_)];
   for (int n = 0; n < cycles; ++n)
     groups += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, false);
-  // relax_region() does not run in the last such result: the whole cycle that follows ends with it. Nor does
-  // it run in the first one, when the tool goes on to press other voxels.
+  // relax_region() does not run in the last such result: the whole cycle of the next result ends with it. It
+  // does not run in the first such result either: the tool then goes on to press other voxels.
   if (!first && coarse_first_left_ > 0) relaxation_.relax_region(state_, obstacles);
   work_ = groups / kGroupsOfRow;
 }
@@ -303,7 +304,7 @@ void ShadowObject::pack_block_moves() noexcept {
       ways[p] = glm::dvec3(0.0);
       continue;
     }
-    // move_block() does not move a block by so little.
+    // Smaller motion is left out, because move_block() would ignore it.
     if (std::max({std::fabs(way.x), std::fabs(way.y), std::fabs(way.z)}) <= multigrid().restricted_m())
       way = glm::vec3(0.0F);
     ways[p] = glm::dvec3(way);

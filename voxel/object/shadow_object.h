@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Asynchronous relaxation of a soft object: a second state of the same object (its shadow), which another
-// thread brings nearer to rest while the tick moves the first.
+// thread brings nearer to rest while the tick moves the object itself.
 //
 // Tick and thread take turns with the shadow, and neither waits for the other:
 //
 // submit()      the tick hands over the rows that changed since the last submission;
 // relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels where they were
-//               submitted, and packs what changed (the result);
+//               submitted, and packs the changes (the result);
 // apply_near()  later the tick adds the result's rows near the contact: at once, so that no step is felt, or
-//               in parts, each of which leaves the residual of the rest frozen;
+//               in parts, while the residual of the parts still to come stays frozen;
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
 //
 // Without active limits displacements are linear, so a result can be added to the motion that the tick made
-// meanwhile. Each residual must then be owned by exactly one of the two solvers. What was submitted belongs
-// to the thread: around the contact it counts as frozen from then on (Relaxation::assign_residual), and the
-// tick relaxes only what it moves itself. If the tick leaves a fraction X of its residual and a cycle leaves
-// Y of the other, the total left is X + Y.
+// meanwhile. Each residual must then be owned by exactly one of the two solvers. The submitted residual
+// belongs to the thread. Around the contact it counts as frozen from then on (Relaxation::assign_residual),
+// and the tick relaxes only the residual of its own motion. If the tick leaves X of its own residual and a
+// cycle of the thread leaves Y of the thread's residual, X + Y is left in total.
 //
 // Coarse cells are not exchanged: each side has its own. Changes too small to matter are deferred until all
 // is at rest.
@@ -80,7 +80,8 @@ class ShadowObject {
   [[nodiscard]] Result result() const;
   void replay_result(const Result& result) noexcept;
   [[nodiscard]] std::uint64_t times_relaxed() const { return times_relaxed_; }
-  // Cost of the last relax(), in rows that a whole cycle writes in that time (all levels).
+  // Cost of the last relax(), as the number of rows (on all levels) that a whole cycle writes in the same
+  // time.
   [[nodiscard]] std::size_t work() const { return work_; }
 
   // Displacement of a rest point in the shadow's state; 0 if no voxel is near. For the thread that relaxes.
@@ -95,10 +96,10 @@ class ShadowObject {
   static std::size_t at(RowId row) { return static_cast<std::size_t>(row) * kRow; }
 
   // Rows on their way from one thread to the other. They are contiguous in memory, because fetching data that
-  // another core wrote costs more than adding them.
+  // another core wrote costs more than adding the rows.
   class RowDelta {
    public:
-    // `arrays` arrays of each row, [array][lane].
+    // Stores `arrays` arrays per row: [array][lane].
     explicit RowDelta(std::size_t rows, std::size_t arrays = 3)
         : floats_(arrays * kRow), rows_(rows), values_(rows * floats_), after_(rows) {}
     void clear() noexcept {
@@ -116,7 +117,7 @@ class ShadowObject {
     [[nodiscard]] RowId row(std::size_t n) const { return rows_[n]; }
     [[nodiscard]] const float* values(std::size_t n) const { return values_.data() + floats_ * n; }
     [[nodiscard]] float* values(std::size_t n) { return values_.data() + floats_ * n; }
-    // Takes the memory of so many rows now.
+    // Populates the memory for this many rows.
     void populate(std::size_t rows) noexcept {
       rows_.populate();
       values_.populate(rows * floats_, {true});
@@ -220,7 +221,7 @@ class ShadowObject {
   std::vector<Obstacle> obstacles_;
   std::size_t moving_obstacles_ = 0;
   std::vector<VoxelId> held_;
-  std::array<LazyArray<float>, 3> before_;  // [axis][voxel] this state as the object knows it
+  std::array<LazyArray<float>, 3> before_;  // [axis][voxel] submitted displacement plus packed changes
   std::size_t work_ = 0;
   int coarse_first_left_ = 0;      // results still to come with coarse levels first
   bool was_coarse_first_ = false;  // the last result had coarse levels first
@@ -235,12 +236,12 @@ class ShadowObject {
   LazyArray<std::uint8_t> deferred_;  // [row] 1: in deferred_rows_
   static constexpr int kDistances = 64;
   std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] first of by_distance_
-  LazyArray<std::uint8_t> distance_;                   // [n] distance of the nth row in the log
-  LazyArray<RowId> by_distance_;                       // rows of the log, nearest to the contact first
+  LazyArray<std::uint8_t> distance_;  // [n] distance of the nth row in the log from the contact, in rows
+  LazyArray<RowId> by_distance_;      // rows of the log, nearest to the contact first
 
   // ---- data of the exchange ----
   RowDelta submitted_;
-  std::array<RowDelta, 2> results_;        // the one being applied, and the next: motion, and loads of bricks
+  std::array<RowDelta, 2> results_;  // result being applied, and the next one; motion and loads of bricks
   std::array<BlockMoves, 2> block_moves_;  // [as results_]
   std::vector<SubmittedRole> submitted_roles_;
   std::vector<SubmittedObstacle> submitted_obstacles_;
@@ -249,13 +250,13 @@ class ShadowObject {
   std::size_t submitted_pressed_ = 0;  // the tool presses the first so many voxels of submitted_held_
   glm::dvec3 submitted_tool_m_{0.0};   // centre of the tool at the submission
   int unsettled_ = 0;                  // results still to come that relax the contact once more
-  bool settle_contact_ = false;        // the present result does so
+  bool settle_contact_ = false;        // the present result relaxes the contact once more
   Relaxation::NearRows near_;          // rows of the contact
   std::size_t applying_ = 0, rows_applied_ = 0;  // index into results_; rows applied of that result
   RetryQueue retry_;                             // entries of that result to try again
   bool retries_rows_ = false;                    // rows that could not follow are tried again
   bool together_ = false;                        // rows near the contact are applied together
-  std::size_t near_count_ = 0;                   // rows near the contact in the other result
+  std::size_t near_count_ = 0;                   // number of rows near the contact in the result packed last
   int parts_left_ = 0;                           // parts of the rows near the contact still to be applied
   bool at_rest_ = true;
   double residual_N_ = 0.0;

@@ -13,8 +13,8 @@ namespace voxel {
 
 namespace {
 
-// Of the spacing: if more than this is left of a row's motion, the row is tried again. Smaller remainders
-// occur in every result while a contact is at its limits.
+// Fraction of the spacing. If more than this is left of a row's motion, the row is tried again. Smaller
+// remainders occur in every result while a contact is at its limits.
 constexpr float kFollows = 0.01F;
 // Largest number of turns in which rows are tried again: in all, and in the tick that applies the rows near
 // the contact.
@@ -34,7 +34,7 @@ bool ShadowObject::pack_row(RowId row, float least_m) noexcept {
   }
   const bool loads_changed = multigrid().bricks().take_changed(row);
   if (most <= least_m && !loads_changed) return false;
-  // This sum equals the tick's to the last bit.
+  // The tick computes the same sum when it applies the row. Both sums are equal to the last bit.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     float* now = state_.u[axis].data() + at(row);
     float* was = before_[axis].data() + at(row);
@@ -53,8 +53,9 @@ void ShadowObject::fetch_change_ahead(RowId row) const noexcept {
   }
 }
 
-// Prefetches the data that apply_row() reads: lines that another core wrote, and rows that have left the
-// caches since the last result. Rows that are applied together have most of their neighbours in the cache.
+// Prefetches the data that apply_row() reads: cache lines that another core wrote, and rows that were evicted
+// from the caches since the last result. Rows that are applied together have most of their neighbours in the
+// cache.
 void ShadowObject::fetch_ahead(SoftObject& object, std::size_t n, bool together) const noexcept {
   if (n >= results_[applying_].count()) return;
   const RowId row = results_[applying_].row(n);
@@ -91,8 +92,8 @@ void ShadowObject::take_delta(SoftObject& object, std::size_t n, float part, Row
   }
 }
 
-// Applies `part` of the motion of the nth row. True if free voxels did not follow; the result then has the
-// rest of their motion.
+// Applies `part` of the motion of the nth row. Returns true if voxels did not follow and the row should be
+// tried again. The result then keeps the rest of their motion.
 bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
   const RowId row = results_[applying_].row(n);
@@ -105,7 +106,7 @@ bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noex
   }
   to.add_motion(row, ways, object.state_, object.obstacle_view());
   object.note_moved(row);
-  unsigned others = 0;  // all differences are counted: a search for the first took longer
+  unsigned others = 0;  // counts all differences; a search for the first one took longer
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) others += wanted[axis][i] != there[i] ? 1U : 0U;
@@ -126,9 +127,9 @@ bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noex
   return most > kFollows * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// Applies rows first … last − 1 together: each goes as far as its links to the others' new places allow. If
-// rows were applied one by one, voxels that active limits tie together would not move. Without active limits
-// rows do not obstruct one another, and applying them one by one takes half the time.
+// Applies rows first … last − 1 together. Each row moves as far as its links to the other rows' new places
+// allow. If rows were applied one by one, voxels that active limits tie together would not move. Without
+// active limits rows do not obstruct one another, and applying them one by one takes half the time.
 void ShadowObject::apply_together(SoftObject& object, std::size_t first, std::size_t last,
                                   float part) noexcept {
   Multigrid& to = object.relaxation_.multigrid();
@@ -175,12 +176,13 @@ void ShadowObject::apply_near(SoftObject& object, int parts) noexcept {
   together_ = large_motion_ || at_limits_;
   rows_applied_ = near_count_;
   parts_left_ = parts;
-  // Loads of bricks are not split into parts, so the motion that belongs to them is not either.
+  // Loads of bricks are not split into parts. So the motion that belongs to them is not split either.
   apply_part(object, parts <= 1 || retries_rows_ || lattice_.has_bricks());
 }
 
-// While parts are left, the same fraction of the submitted residual stays frozen. The tissue is at rest at
-// both ends of the motion. So it is at rest in between, as far as forces are linear.
+// While a fraction of the motion is still to come, the same fraction of the submitted residual stays frozen.
+// The tissue is at rest before the first part and after the last. So it is also at rest between parts, as far
+// as forces are linear.
 void ShadowObject::apply_part(SoftObject& object, bool last) noexcept {
   const int left = std::max(parts_left_, 1);
   const bool whole = last || left == 1;

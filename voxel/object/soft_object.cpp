@@ -108,7 +108,7 @@ SoftObject::Gap SoftObject::gap(const ToolInBody& tool, const glm::dvec3& positi
   if (tool.shape == ToolInBody::Shape::punch) {
     const double along = glm::dot(d, tool.axis);
     const double across2 = glm::dot(d, d) - along * along;
-    // The face presses what lies in front of it, not behind it.
+    // The face presses tissue in front of it, not behind it.
     const bool under = across2 <= tool.radius * tool.radius && along > -4.0 * lattice_->max_spacing_m();
     return {under ? along - voxel_radius() : std::numeric_limits<double>::max(), tool.axis};
   }
@@ -187,8 +187,8 @@ Displacement::Role SoftObject::resting_role_at(std::uint32_t surface) const noex
                                                                              : Displacement::obstacle;
 }
 
-// Only pressed voxels are kept from the background. A touched voxel without load has to move with its
-// neighbours: if it were held, coarse corrections would shear it, more in each cycle.
+// Only pressed voxels are excluded from background relaxation. A touched voxel without load has to move with
+// its neighbours: if it were held, coarse corrections would shear it, more in each cycle.
 void SoftObject::set_touch_roles() noexcept {
   for (const Touch& t : touches_) {
     const Displacement::Role resting = resting_role_at(t.surface);

@@ -4,7 +4,8 @@
 //
 // Terms: a surface voxel near the tool is *touched* (a contact candidate, one Touch each). A touched voxel
 // that carries load towards the tool is *pressed* (an active contact). A *held* voxel does not move while
-// others relax. *Dependents* of a voxel are tied to it by links at active limits.
+// others relax. *Dependents* of a voxel are tied to it by links at active limits. A *pair* is a contact of a
+// voxel of one soft object with a facet of another (facet_contact.h). It presses voxels of both.
 //
 // One haptic tick calls (see hybrid/tick/tick.cpp): touch() takes the surface voxels near the tool →
 // push_out() moves voxels out of the tool, and the chain follows → relax_near() brings the neighbourhood of
@@ -53,7 +54,7 @@ struct ContactLoad {
   glm::dvec3 force_N{0.0};            // of its links and of its dependents
   glm::dvec3 stiffness_N_per_m{0.0};  // per axis, of the voxel and its dependents, all others fixed
   bool at_limit = false;              // a link at its limit carries load between the voxel and another one
-  bool has_multipliers = false;  // known: multipliers of limits and obstacles around the voxel (AdmmRegion)
+  bool has_multipliers = false;  // AdmmRegion knows the multipliers of limits and obstacles around the voxel
   double pressed_N = 0.0;        // force of its obstacle along the normal; 0 unless has_multipliers
 };
 
@@ -75,7 +76,7 @@ class SoftObject {
   SoftObject& operator=(const SoftObject&) = delete;
   SoftObject(SoftObject&&) = delete;
   SoftObject& operator=(SoftObject&&) = delete;
-  // The same object in the same state; the lattice is shared. For references beside a running session.
+  // Returns an object in the same state that shares the lattice. For references beside a running session.
   // Allocates.
   [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
 
@@ -92,14 +93,14 @@ class SoftObject {
   // A voxel acts as a ball of this radius: the tool's surface stays this far from the voxel's centre.
   [[nodiscard]] double voxel_radius() const { return 0.5 * lattice_->min_spacing_m(); }
   // Distance from a ball tool's centre to the centre of a voxel in contact. A tool smaller than the gaps
-  // between voxels is felt as one that just cannot slip between them.
+  // between voxels is felt as if it were just too large to slip between them.
   [[nodiscard]] double reach(double tool_radius) const;
 
   // A large object may keep its contact on nested patches (composite/grid.h). Then the cost of a tick does
-  // not depend on depth and size. state() stays at rest, as before the contact; displacement() returns the
-  // present displacements. This is only for objects that touch nothing but the tool and rigid surfaces that
-  // stand still. Call it before obstacles are set. If the object is unsuitable, returns the reason and
-  // changes nothing. Returns an empty string if patches are in use. Allocates.
+  // not depend on depth and size. state() then stays at rest, and displacement() returns the present
+  // displacements. Patches are only for objects that touch nothing but the tool and rigid surfaces that stand
+  // still. Call use_composite_grid() before obstacles are set. If the object is unsuitable, returns the
+  // reason and changes nothing. Returns an empty string if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   std::string use_composite_grid(const ToolInBody& tool);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
@@ -120,7 +121,7 @@ class SoftObject {
   // Moves every touched voxel out of the tool, and the chain follows. True if any voxel overlapped the tool.
   bool push_out(const ToolInBody& tool) noexcept;
   void relax_near(const ToolInBody& tool, int sweeps) noexcept;
-  // Has a cycle around a large contact patch, or part of such a cycle, run since touch()?
+  // True if a cycle around a large contact patch, or a part of one, ran since touch().
   [[nodiscard]] bool large_patch_cycle() const { return split_cycle_; }
   // Share (0 to 1) of the counted work that a tick may spend on its contact under asynchronous relaxation;
   // less than 1 for a slow machine. Later ticks do the remaining work.
@@ -134,10 +135,10 @@ class SoftObject {
   // Does the tool press a large patch and hardly move? Slip of single voxels and results that are still to
   // come do not count as motion.
   [[nodiscard]] bool contact_is_still() const noexcept;
-  // In the next tick no contact cycle begins or continues while the tool presses the object.
+  // Makes the next tick neither begin nor continue a contact cycle while the tool presses the object.
   void skip_next_cycle() noexcept { skip_requested_ = true; }
-  // Does a part of the work of the next exchange with the ShadowObject one tick ahead. False if too little of
-  // that work is due to be worth a tick.
+  // Prepares the next exchange with the ShadowObject one tick ahead: drops coarse cells. Returns false, and
+  // does nothing, if so few of them are due that they do not need a tick of their own.
   bool prepare_exchange() noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta` (unit: meter): each pressed voxel moves by the component of `delta` along the
@@ -149,17 +150,18 @@ class SoftObject {
   // the tool but must not push it: the tool may stay as deep as it was when the tick began. A voxel that was
   // beside a punch when the tick began bounds the punch sideways. Returns the number of bounds written.
   std::size_t give_way(const ToolInBody& tool, std::span<ToolBound> out) const noexcept;
-  // Does a chain of links at their limits tie the voxel to something that does not move along `direction`, an
-  // anchor or a voxel on a rigid surface? Searches along the largest component of `direction`, through a few
-  // hundred voxels at most.
+  // Does a chain of links at their limits tie the voxel to an anchor, or to a voxel that a rigid surface
+  // stops along `direction`? Searches along the largest component of `direction`, through a few hundred
+  // voxels at most.
   [[nodiscard]] bool is_immovable(VoxelId v, const glm::dvec3& direction) noexcept;
   std::uint64_t relax_background(std::uint64_t budget) noexcept;
-  // One cycle over the whole object, whatever it costs; nothing if the object is at rest.
+  // Runs one cycle over the whole object, without a limit on its work. Does nothing if the object is at rest.
   void relax_cycle() noexcept;
 
   // Call it before the first set_obstacle(). Allocates.
   void reserve_obstacles();
-  // Call it if obstacles will move, before a ShadowObject is made. Allocates all memory for that.
+  // Call it if obstacles will move, before a ShadowObject is made. Allocates all memory that moving obstacles
+  // need.
   void prepare_beside_bodies();
   // Sets the rigid surface near surface voxel number s (index into lattice().surface()). A zero normal
   // removes it.
@@ -168,8 +170,9 @@ class SoftObject {
   // Call it after obstacles moved: moves these surface voxels out of them in one wave; the chain follows.
   void leave_obstacles(std::span<const std::uint32_t> surface_numbers) noexcept;
   // Finds the loads of voxels at obstacles. `held` lists each voxel once, in the order of `loads`. Obstacles
-  // press the first `pressed` voxels (kMaxTouched at most); the others are only near. If one of the others
-  // depends on a pressed voxel on an axis, its load counts for that voxel and is 0 here.
+  // press the first `pressed` voxels (kMaxTouched at most); the others are only near. If one of these is a
+  // dependent of a pressed voxel on an axis, its own force on that axis is 0: the force is added to that of
+  // the pressed voxel.
   void contact_loads(std::span<const VoxelId> held, std::size_t pressed,
                      std::span<ContactLoad> loads) noexcept;
   // Under asynchronous relaxation: if links at voxels pressed by fixed obstacles are at their limits, relaxes
@@ -198,15 +201,15 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 pair_load(std::uint32_t surface_number) const noexcept {
     return glm::dvec3(pair_load_[surface_number]);
   }
-  // Finds the dependents of the voxels that pairs press, at most kMaxTouched voxels. They are kept until
+  // Finds the dependents of at most kMaxTouched voxels that pairs press. The dependents are kept until
   // forget_pair_dependents().
   void find_pair_dependents() noexcept;
   void forget_pair_dependents() noexcept;
   // Runs one cycle around the voxels that pairs press, or a part of a cycle for a large patch. Does nothing
   // unless these voxels have dependents, the tool presses nothing, and relaxation is asynchronous.
   void relax_near_pairs() noexcept;
-  // For a voxel that pairs press: the load of its dependents, without its own links; the stiffness of the
-  // voxel with its dependents. Zero if no dependents are known.
+  // For a voxel that pairs press. The load is that of the voxel's dependents, without the voxel's own links.
+  // The stiffness is that of the voxel with its dependents. Both are 0 if no dependents are known.
   [[nodiscard]] ContactLoad dependents_of_pair(std::uint32_t surface_number) const noexcept {
     if (pair_dependents_.empty()) return {};
     const std::uint32_t entry = pair_entry_[surface_number];
@@ -218,8 +221,8 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 compliance(VoxelId v) noexcept;
   // Moves a voxel as far as its links allow.
   void move(VoxelId v, const glm::dvec3& displacement) noexcept;
-  // drag() moves a voxel regardless of its links. After all drags settle_dragged() lets the chain follow;
-  // anchors and rigid surfaces may keep a voxel from the place to which it was dragged.
+  // drag() moves a voxel regardless of its links. After all drags, call settle_dragged(): the chain follows.
+  // Anchors and rigid surfaces may keep a voxel from the place to which it was dragged.
   void drag(VoxelId v, const glm::dvec3& by) noexcept;
   void settle_dragged() noexcept;
 
@@ -240,8 +243,8 @@ class SoftObject {
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
   // Force of the springs on the anchors (N, body frame); at rest it equals the force that presses the object.
-  // Empty if a link to an anchor is at its limit, because its spring does not show the load of that link. For
-  // references.
+  // Empty if a link to an anchor is at its limit, because the spring of such a link does not show the link's
+  // load. For references.
   [[nodiscard]] std::optional<glm::dvec3> carried_by_anchors_N() const noexcept;
   // Energy of the springs plus plastic dissipation since the last state of rest (J). For tests and reports.
   [[nodiscard]] double energy_J() const noexcept;
@@ -263,12 +266,11 @@ class SoftObject {
     bool pressed = false;    // carries load towards the tool
     glm::dvec3 rest{0.0};    // stored, because it is used several times a tick and costs two divisions
     glm::dvec3 normal{0.0};  // from tool to voxel, unit
-    glm::dvec3 load{
-        0.0};  // of its links; with other soft objects, blocks or obstacles also of its dependents (N)
+    glm::dvec3 load{0.0};  // N; of its links; if there are pairs, blocks or obstacles, also of its dependents
     double start_depth = 0.0;       // depth in the tool at the start of the tick (m)
     bool beside_punch = false;      // it was beside a punch at the start of the tick
     bool at_limit = false;          // a link at its limit carries load between the voxel and another one
-    glm::dvec3 frozen_motion{0.0};  // motion that was left to the voxel when the residual was frozen (m)
+    glm::dvec3 frozen_motion{0.0};  // motion to equilibrium that remained when the residual was frozen (m)
     std::uint16_t block = 0;        // number of its rigid block, from 1 on (Lattice::block()); 0: none
   };
   struct Gap {
@@ -276,8 +278,8 @@ class SoftObject {
     glm::dvec3 normal{0.0};
   };
   static constexpr std::size_t kMaxGathered = 20'000;  // pressed voxels and their dependents
-  static constexpr double kDirtyMotion = 1e-5;         // of the spacing: a smaller motion wakes nothing
-  // Of the voxel radius: less overlap is left to the next push_out().
+  static constexpr double kDirtyMotion = 1e-5;  // fraction of the spacing; a smaller motion wakes nothing
+  // Fraction of the voxel radius. A smaller overlap is left to the next push_out().
   static constexpr double kGiveWay = 0.01;
   struct Gathered {
     VoxelId v;
@@ -291,8 +293,8 @@ class SoftObject {
 
   [[nodiscard]] glm::dvec3 position(const Touch& t) const { return t.rest + displacement(t.v); }
   [[nodiscard]] Gap gap(const ToolInBody& tool, const glm::dvec3& position) const noexcept;
-  // Projects a voxel out of the tool, in the metric of its springs. `wished`: displacement that its links
-  // want. `g`: its gap there on entry, its last gap on return.
+  // Projects a voxel out of the tool, in the metric of its springs. `wished`: displacement at the equilibrium
+  // of its links. `g`: on entry its gap at `wished`, on return its gap after the last projection.
   [[nodiscard]] glm::dvec3 project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                            const glm::dvec3& wished, const glm::dvec3& compliance,
                                            Gap& g) const noexcept;
@@ -310,16 +312,16 @@ class SoftObject {
   }
   void set_touch_roles() noexcept;
   void assign_residual() noexcept;  // freezes the residual near the contact: the shadow owns it
-  void keep_frozen_residual(float part) noexcept;  // the shadow still owns this part of it
+  void keep_frozen_residual(float part) noexcept;  // the shadow still owns this fraction
   std::size_t list_held() noexcept;
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t shared(std::size_t work) const noexcept;
-  [[nodiscard]] std::size_t left_of(
-      std::size_t work) const noexcept;  // what is left of `work` in this tick; less while memory is cold
-  // Displacements from rest. clamp_depth_in_tool() shortens the way to `place` so that the voxel gets no
-  // deeper into the tool than it is now. project_on_tool_within_limits() finds the least energy on the tool
-  // within the links' limits. project_voxel() is the constrained projection of one touched voxel.
+  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // what this tick has left of `work`
+  // All arguments and results are displacements from rest. clamp_depth_in_tool() shortens the motion from
+  // `now` to `place` so that the voxel gets no deeper into the tool than it is now.
+  // project_on_tool_within_limits() finds the least energy on the tool within the links' limits.
+  // project_voxel() is the constrained projection of one touched voxel.
   [[nodiscard]] glm::dvec3 clamp_depth_in_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                                const glm::dvec3& now, const glm::dvec3& place) const noexcept;
   [[nodiscard]] glm::dvec3 project_on_tool_within_limits(const ToolInBody& tool, const VoxelLinks& links,
@@ -395,7 +397,7 @@ class SoftObject {
   std::vector<std::uint8_t> obstacle_changed_;  // [surface number] 1: in changed_obstacles_; empty: no shadow
   LazyVector<Touch> touches_;
   LazyVector<Touch> touched_before_;   // pressed touches before touch()
-  std::vector<VoxelId> pressed_last_;  // pressed voxels, kept for the call in which the last one is released
+  std::vector<VoxelId> pressed_last_;  // in the last contact cycle; empty if none is pressed
   ToolInBody tool_;                    // the tool in the last relax_near()
   std::vector<VoxelId> touched_voxels_;
   std::vector<std::uint32_t> touched_numbers_;  // [as touched_voxels_] surface number
@@ -403,12 +405,12 @@ class SoftObject {
   LazyVector<VoxelId> held_voxels_;             // voxels pressed by the tool, then those claimed by pairs
   LazyVector<VoxelId> sources_;
   LazyVector<glm::vec3> moves_;
-  std::vector<BlockBound> block_bounds_;    // bounds of one rigid block: those of its touches, then others
+  std::vector<BlockBound> block_bounds_;    // of one rigid block: first by the tool, then by limits
   std::vector<std::uint32_t> bound_touch_;  // [as the first of block_bounds_] index into touches_
   std::vector<std::uint8_t> block_seen_;    // [block] 1: for_touched_blocks() has visited it
   LimitReactions limit_reactions_;
   LimitFollowers limit_followers_;
-  std::vector<VoxelId> limit_sources_;     // sources for both of these: pressed voxels that are not anchored
+  std::vector<VoxelId> limit_sources_;     // sources of the two above: pressed, not anchored
   LazyVector<Gathered> gathered_;          // pressed voxels first, then their dependents
   LazyVector<Dependent> dependents_;       // [as gathered_]
   LazyArray<std::uint8_t> gathered_mark_;  // [v] 1: in gathered_ (within touch(): was pressed; between drag()
@@ -423,15 +425,15 @@ class SoftObject {
   bool split_cycle_ = false;  // a cycle around a large patch ran, or a part of one
   bool skip_requested_ = false;
   bool skips_cycle_ = false;  // no contact cycle begins in this tick unless the tool jumps
-  bool dragging_ = false;     // sources_ lists dragged voxels, moves_ where they were
+  bool dragging_ = false;     // sources_ lists the dragged voxels, moves_ their displacements before the drag
   bool moved_ever_ = false;
   bool anchors_pull_ = false;   // since push_out() a wave of the chain reached anchors that stopped it
   bool beside_bodies_ = false;  // prepare_beside_bodies() was called
-  bool on_grid_ = false;        // there is a contact, and it is on nested patches
+  bool on_grid_ = false;        // a contact exists, and its displacements are on nested patches
   std::unique_ptr<CompositeGrid> grid_;  // null: contacts are in state_
   double patch_error_ = 0.0;
   std::vector<VoxelId> near_on_grid_;
-  struct TouchOnGrid {  // touched voxels in the finest patch, as a cycle begins
+  struct TouchOnGrid {  // a touched voxel in the finest patch at the start of a cycle
     std::uint32_t touch;
     std::array<int, 3> voxel;
     double gap_m;

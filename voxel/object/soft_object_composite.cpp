@@ -18,8 +18,8 @@ namespace {
 // Voxels of the finest patch beyond the contact. A wide tool has fewer, at least kLeastMargin, because more
 // would exceed the work of a tick.
 constexpr int kMargin = 6, kLeastMargin = 4;
-constexpr double kFelt = 0.3;          // of the force: an axis with less is relaxed in every second tick
-constexpr std::uint32_t kAllAxes = 4;  // first cycles of a contact that relax all axes
+constexpr double kFelt = 0.3;  // fraction of the force; an axis with less is relaxed in every second tick
+constexpr std::uint32_t kAllAxes = 4;  // number of cycles at the start of a contact that relax all axes
 // In spacings. A voxel no further than kPressed from the tool is pressed. Tissue on its way back is still
 // felt up to a distance of kOnItsWay.
 constexpr double kPressed = 0.02, kOnItsWay = 0.5;
@@ -31,7 +31,7 @@ constexpr double kTangent = 2.0, kAcross = 0.5;
 constexpr double kWithDepth = 1.7;
 // Least depth at which displacements are scaled (spacings); largest scaling in a cycle (share of the depth).
 constexpr double kLeastToScale = 0.1, kMostScaled = 1.0;
-constexpr double kLeastDepth = 0.05;  // of the spacing: least depth for the secant stiffness
+constexpr double kLeastDepth = 0.05;  // fraction of the spacing: least depth for the secant stiffness
 constexpr double kNear = 3.0;         // spacings: surface voxels further from the tool are skipped
 constexpr double kAtRest_N = 1e-5;    // force on the tool below which a contact with nothing pressed ends
 constexpr double kMoves = 0.03;       // spacings: a tool that moved further gets a second cycle in the tick
@@ -55,9 +55,9 @@ void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::
 
 std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   if (lattice_->voxel_count() < kLeastOnGrid) return "it is small enough to be known voxel by voxel";
-  assert(obstacles_.empty() && !moved_ever_);  // obstacles are found afterwards
+  assert(obstacles_.empty() && !moved_ever_);  // obstacles are set only after this call
   if (lattice_->max_spacing_m() > kFlat * lattice_->min_spacing_m()) return "its voxels are not cubes";
-  // A ball touches tissue only where the ball is no steeper than links let a surface be.
+  // A ball touches tissue only where its slope is at most the steepest slope that links allow a surface.
   const double h = lattice_->min_spacing_m();
   double steepest = 0.0;
   for (int d = 0; d < 3; ++d)
@@ -210,8 +210,8 @@ SoftObject::Bound SoftObject::bound_by(const ToolInBody& tool, const Touch& t,
   return {axis, way, tool.centre[axis] + way * std::sqrt(square) - t.rest[axis], true};
 }
 
-// Projects pressed voxels onto the tool, in the order of the list and then in reverse: the place of a voxel
-// along the tool depends on its neighbours. The cycle itself does not move voxels along the tool.
+// Projects pressed voxels onto the tool, in the order of the list and then in reverse, because the place of a
+// voxel along the tool depends on its neighbours. The cycle itself does not move voxels along the tool.
 void SoftObject::put_aside(const ToolInBody& tool) noexcept {
   const auto put = [&](const TouchOnGrid& near) {
     if (near.gap_m > kPressed * lattice_->min_spacing_m()) return;
@@ -247,7 +247,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
     glm::dvec3 normal(0.0);
     normal[bound.axis] = bound.way;
     grid_->press(near.voxel, grid_->clamp_to_supports(near.voxel, u), normal);
-    // A voxel that is pressed aside is held there, on the tool's surface.
+    // A voxel that the tool presses sideways is also held sideways, on the tool's surface.
     const glm::dvec3 wished = grid_->unconstrained_minimum(near.voxel);
     Gap g = gap(tool, t.rest + wished);
     if (g.distance >= 0.0) continue;
@@ -258,7 +258,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
   }
 }
 
-// Call it after a cycle. It moves all voxels out of the tool but those that anchors keep there.
+// Call it after a cycle. It moves all voxels out of the tool, except those that anchors keep in it.
 void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
   glm::dvec3 sum(0.0);
   int pressed = 0;
@@ -339,7 +339,7 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   if (away && glm::length(grid_force_N_) < kAtRest_N) on_grid_ = false;
 }
 
-// Displacement of the contact against the force (unit: meter).
+// Displacement of the contact's centre in the direction opposite to the force (unit: meter).
 double SoftObject::depth_on_grid() const noexcept {
   const double size = glm::length(grid_force_N_);
   if (size == 0.0 || !grid_->in_fine_patch(centre_)) return 0.0;
@@ -366,7 +366,8 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
     result.stiffness_N_per_m =
         glm::dmat3(kAcross * secant) + (kTangent - kAcross) * secant * glm::outerProduct(n, n);
   }
-  // Until the next cycle: the last force, less stiffness times the tool's motion since then.
+  // Until the next cycle the force is that of the last cycle, less stiffness times the tool's motion since
+  // then.
   result.force_N = grid_force_N_ - result.stiffness_N_per_m * (tool.centre - grid_tool_m_);
   if (glm::dot(result.force_N, n) < 0.0) result.force_N = glm::dvec3(0.0);
   result.force_N *= contact_energy_.share();

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::size_t kMost = 4096;  // largest number of moving voxels
 constexpr std::size_t kMostKnown = 8 * kMost;
-constexpr int kDeep = 3;  // layers of neighbours that all belong to the region
-constexpr int kFar = 12;  // all layers; those beyond kDeep follow only links at their limits
+constexpr int kDeep = 3;  // number of layers of neighbours that belong to the region completely
+constexpr int kFar = 12;  // number of all layers; layers beyond kDeep follow only links at their limits
 constexpr int kSweeps = 30, kTickSweeps = 6;  // sweeps in a round beside moving bodies; in a tick
 constexpr int kToolSweeps = 100;              // sweeps in a round under the tool, which no tick waits for
 constexpr std::uint64_t kOtherWork = 5;
@@ -24,12 +24,13 @@ constexpr double kNearLimit = 0.4;
 // Limits are tightened by this while the least energy is searched, so that the result hardly violates them
 // (unit: spacing).
 constexpr double kTighter = 2e-5;
-// The same under the tool, where cycles and the tick continue from the result up to the limits themselves.
+// Replaces kTighter under the tool. There cycles and the tick continue from the result up to the limits
+// themselves.
 constexpr double kTighterAtTool = 2e-6;
-constexpr double kSqueezed = 5e-3;  // (unit: spacing) a voxel deeper in an obstacle than this is squeezed: it
-                                    // cannot leave the obstacle
+constexpr double kSqueezed =
+    5e-3;  // (unit: spacing) a voxel deeper in an obstacle counts as squeezed: limits keep it there
 constexpr int kRounds = 4;          // rounds that alternate between limits and obstacles
-constexpr int kMostPasses = 60;     // most passes until one axis is within its limits
+constexpr int kMostPasses = 60;     // largest number of passes to bring one axis within its limits
 constexpr double kRounding = 1e-9;  // (unit: spacing)
 
 }  // namespace
@@ -254,9 +255,9 @@ void AdmmRegion::set_multipliers() noexcept {
   }
 }
 
-// Brings one axis within its limits: lowers each member (`downwards`) to the shortest path from any other
-// member, or raises it. Solutions of difference constraints are closed under minimum and maximum, so lowering
-// and then raising suffices. False if kMostPasses passes did not suffice.
+// Brings one axis within its limits. Lowers each member (`downwards`), or raises it, to the bound that the
+// shortest path from any other member gives. Solutions of difference constraints are closed under minimum and
+// maximum, so lowering and then raising suffices. False if kMostPasses passes did not suffice.
 bool AdmmRegion::come_within(std::size_t axis, bool downwards) noexcept {
   const std::size_t count = members_.size();
   for (int n = 0; n < kMostPasses; ++n) {

@@ -2,8 +2,8 @@
 // Minimises the energy of tissue at its limits, beside a body or under the tool. Limits and obstacles are
 // solved together on a small region.
 //
-// If voxels moved one at a time, hardly any could move there: limits block each voxel alone, and a voxel that
-// slides along a body takes its dependents in other directions. Coarse levels do not help.
+// Relaxation of one voxel at a time hardly works there: limits block each single voxel, and a voxel that
+// slides along a body drags its dependents in other directions. Coarse levels do not help.
 //
 // The solver is the alternating direction method of multipliers (ADMM; Boyd et al., Distributed Optimization
 // and Statistical Learning via ADMM, 2011, chapter 3), with a Gauss-Seidel sweep instead of the exact
@@ -36,7 +36,7 @@ class AdmmRegion {
   explicit AdmmRegion(const Lattice& lattice);
   // Allocates all memory now rather than when a body is first pressed.
   void prepare_all();
-  // The same without the arrays by voxel, most of which a tool never touches.
+  // Allocates all memory except the arrays by voxel, most of which a tool never touches.
   void prepare_lists();
 
   // Relaxes a region: voxels that active limits hold or that are in `on_body`, and their neighbourhood, which
@@ -72,10 +72,10 @@ class AdmmRegion {
     VoxelId v = 0;
     bool moves = false;    // false: a fixed voxel that borders the region
     bool outside = false;  // it has to stay outside of an obstacle or of the tool
-    Obstacle plane;        // the half-space of that obstacle, for the displacement
+    Obstacle plane;        // half-space that bounds the displacement, of the obstacle or the tool
     std::array<std::uint32_t, 3> up{kNone, kNone, kNone},
         down{kNone, kNone, kNone};  // neighbours, as indices into members_
-    Axes from{}, found{};           // displacement before, and of the current iterate (m)
+    Axes from{}, found{};           // displacement before relax(), and of the current iterate (m)
     Axes load_N{};                  // load without the forces of its links
     Axes inverse{};                 // 1 / (springs of its links and all penalties), per axis (m/N)
     double hold_N_per_m = 0;        // penalty of its obstacle
@@ -111,9 +111,10 @@ class AdmmRegion {
   LazyVector<Member> members_;
   LazyVector<Link> links_;           // [3 member + d]
   LazyArray<std::uint32_t> number_;  // [v] 1 + index into members_; 0: none
-  // Kept from call to call.
+  // The following members are kept from call to call.
   LazyVector<VoxelId> known_;
-  LazyArray<std::uint32_t> asked_;  // [v] number of the last call that used its multipliers; 0: none is kept
+  LazyArray<std::uint32_t>
+      asked_;  // [v] number of the last call that used its multipliers; 0: it has no multipliers
   // [3 axis + d][v] scaled multiplier of the link to the voxel above (m)
   std::array<LazyArray<float>, 9> beyond_;
   std::array<LazyArray<float>, 3> pressed_;  // [axis][v] force of the obstacle (N)

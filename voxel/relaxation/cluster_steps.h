@@ -25,10 +25,11 @@ class ClusterSteps {
   explicit ClusterSteps(const Lattice& lattice);
 
   // Moves the cluster of a voxel on one axis. A rigid block belongs to a cluster as a whole. Nothing moves in
-  // these cases: a voxel of the cluster is held, anchored, at an obstacle or in a block that the tool
-  // presses; the cluster's net force points against that of the voxel or is at most `least_N` per voxel; the
-  // voxel was in another cluster on this axis since begin(); too many voxels were visited since begin(), or
-  // are in the cluster. Returns the force per voxel that moved the cluster (N), or 0 if nothing moved.
+  // four cases. (1) A voxel of the cluster is held, anchored, at an obstacle, or in a block that the tool
+  // presses. (2) The voxel's force, or the cluster's net force per voxel, is at most `least_N`, or the two
+  // point in opposite directions. (3) The voxel was in another cluster on this axis since begin(). (4) Too
+  // many voxels were visited since begin(), or are in the cluster. Returns the force per voxel that moved the
+  // cluster (N), or 0 if nothing moved.
   double move(Multigrid& multigrid, Displacement& state, VoxelId v, int axis, double least_N) noexcept;
   // Voxels of the last cluster.
   [[nodiscard]] const std::vector<VoxelId>& moved() const { return cluster_; }

@@ -49,7 +49,8 @@ void add_links(const RowStiffness& springs, const RowLimits& limits, std::size_t
   pull += k_up * up + k_down * down;
   const std::array<float, 2> above = bounds_of<kAxis, kD, true>(limits, lane),
                              below = bounds_of<kAxis, kD, false>(limits, lane);
-  // If a row has one set of limits for all lanes, missing links have limits, too. They have no spring.
+  // If a row has one set of limits for all lanes, missing links have limits, too. A missing link is
+  // recognised by its stiffness of 0.
   if (k_up > 0.0F) {
     interval[0] = std::max(interval[0], up - above[1]);
     interval[1] = std::min(interval[1], up - above[0]);
@@ -120,7 +121,7 @@ void LimitFollowers::move_on(std::span<const VoxelId> sources) noexcept {
   }
 }
 
-// Visits voxel `at` from its neighbour `from` along kD, which is below it (kUp) or above it.
+// Visits voxel `at` from its neighbour `from`, which lies below `at` along kD (kUp) or above it.
 template <std::size_t kAxis, std::size_t kD, bool kUp>
 void LimitFollowers::visit(VoxelId from, VoxelId at) noexcept {
   Row* row = look_at(at / kRow);

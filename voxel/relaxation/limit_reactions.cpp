@@ -33,8 +33,8 @@ struct LimitReactions::Gathering {
   std::bitset<Lattice::kMaxBlocks> known;
   std::array<double, Lattice::kMaxBlocks> pull_N;  // [block] valid if known[block]
 
-  // Voxels of a rigid block get the sign of the block's load. Their own loads have either sign, and would end
-  // the search at an inclusion.
+  // Gives the voxels of a rigid block the sign of the block's load. Their own loads may have either sign,
+  // which would end the search at an inclusion.
   void pull_as_blocks(const Displacement& state, int axis, Row& row) {
     std::uint32_t of_blocks = 0, up = 0, down = 0;
     std::uint16_t last = 0;  // most rows hold one block only
@@ -109,8 +109,8 @@ LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
   return &out;
 }
 
-// Lanes of a row that links at their limits push against their loads, or block both ways. `end` tells which
-// end of these links lies in the row.
+// Returns the lanes of a row whose voxels are pushed against their loads, or blocked both ways, by links at
+// their limits. `end` tells which end of these links lies in the row.
 std::uint32_t LimitReactions::pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                      End end) noexcept {
   const std::uint32_t up = end == End::upper ? at_low : at_high, down = end == End::upper ? at_high : at_low;
@@ -159,7 +159,7 @@ void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std:
   }
   find_all();
   // A source may lie beside a dependent of another source. Its row is looked at, too, so that dependents()
-  // does not take the link between both for a link to others.
+  // does not count the link between the two as a link to other voxels.
   for (const VoxelId v : sources) {
     if (rows_.empty()) break;
     if (find(v / kRow) != nullptr) continue;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dependents of given voxels through links at their limits, and the loads and springs of all of them
-// together.
+// Finds the dependents of given voxels through links at their limits, and sums their loads and the stiffness
+// of their springs.
 //
 // The search handles a row of 32 voxels at a time, as bits, because a tool that has pushed a chain to its
 // limits has some ten thousand dependents.
@@ -32,22 +32,22 @@ class LimitReactions {
 
   // ---- none of these allocates or throws ----
   // Finds, on one axis, all dependents of `sources` (sorted by id, none anchored), directly or through
-  // others. A voxel depends on a neighbour if their link is at a limit and pushes it against its own load, or
-  // if the link allows it to move neither way. Drops what was found before.
+  // others. A voxel depends on a neighbour in two cases. Either their link is at a limit and pushes the voxel
+  // against its own load, or the link lets the voxel move neither way. Drops what was found before.
   void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> sources,
               int axis) noexcept;
-  // The same for the dependents of a rigid block. The load of a voxel in another block is the load of that
-  // block.
+  // Finds, on one axis, all dependents of a rigid block. The load of a voxel in another block is the load of
+  // that block.
   void gather_on_block(LevelStiffness& couplings, Displacement& state, const Multigrid& multigrid,
                        std::size_t block, int axis) noexcept;
-  // Is the voxel a dependent, or a source that has any? For other sources the answer is undefined.
+  // Is the voxel a dependent, or a source that has dependents? For other sources the answer is undefined.
   [[nodiscard]] bool gathered(VoxelId v) const noexcept {
     return (gathered_in(v / kRow) >> v % kRow & 1U) != 0;
   }
   // True if a link from this source to a voxel that is not anchored is at a limit.
   [[nodiscard]] bool at_limit(VoxelId source) const noexcept;
-  // Sum of the dependents' loads, sources excluded (N), and of the springs between dependents and others
-  // (N/m).
+  // Sum of the loads of all dependents (N), without those of the sources. Sum of the stiffness of all links
+  // between a dependent and a voxel that is neither dependent nor source (N/m).
   struct Dependents {
     double force_N = 0.0, stiffness_N_per_m = 0.0;
   };

@@ -10,17 +10,18 @@
 namespace voxel {
 namespace {
 
-// Share of kRestingResidual at which relaxation stops. A residual is measured before coarse levels correct
-// it. Around tissue a hundred times stiffer, more can be left afterwards.
+// Share of kRestingResidual at which relaxation stops. It is less than 1 because the residual is measured
+// before the correction by coarse levels. Around tissue that is a hundred times stiffer, a larger residual
+// can be left after the correction.
 constexpr double kMeasured = 0.5;
 // A pending correction larger than this is dropped (unit: spacing). Otherwise cells between obstacles could
 // diverge.
 constexpr float kFarthest = 2.0F;
 constexpr std::uint64_t kPatient = 200'000;  // voxel updates per call; a tick has a smaller budget
-// Margin of cells around a contact that are smoothed on each level: in a contact cycle; in a cycle on a large
-// patch.
+// Margin, in cells, around a contact that is smoothed on each level: in a contact cycle, and in a cycle on a
+// large patch.
 constexpr int kContactMargin = 3, kLargePatchMargin = 14;
-// Margin of cells around a contact that get corrections after a jump.
+// Margin, in cells, around a contact that gets corrections after a jump.
 constexpr int kProlongedMargin = 24;
 constexpr int kNear = 2;                     // rows that a contact cycle reads around those it relaxes
 constexpr std::uint64_t kBesideContact = 2;  // the budget is divided by this if a contact cycle ran
@@ -107,7 +108,7 @@ void Relaxation::mark_all_dirty() noexcept {
   }
 }
 
-// Held voxels are fixed; pressed voxels slide and are fixed along the tool's normal.
+// Fixes held voxels on all axes, and pressed voxels along the tool's normal only: they slide.
 void Relaxation::fix_held_voxels(const Displacement& state, std::span<const VoxelId> held) noexcept {
   standing_.clear();
   bool others_hold = false;
@@ -119,7 +120,7 @@ void Relaxation::fix_held_voxels(const Displacement& state, std::span<const Voxe
       standing_.push_back(v);
   }
   // Brick loads lag by a cycle. With ν near 0.5 this error exceeds the part of the force that springs model,
-  // and the region would oscillate.
+  // and AdmmRegion would oscillate. So it does not run under the tool on objects with bricks.
   tool_presses_ = tool_presses_ && !others_hold && !lattice_.has_bricks();
   multigrid_.set_held(standing_);
   multigrid_.set_block_contacts(state, held);
@@ -164,7 +165,7 @@ std::uint64_t Relaxation::run(Displacement& state, const ObstacleView& obstacles
       end_round(state, obstacles, std::min(residual_N_, 0.99 * tolerance_N_));
     }
   }
-  // unused budget is not saved for a tick that has enough to do
+  // unused budget is not carried over to later calls
   credit_ = std::min<std::int64_t>(credit_, 0);
   return spent;
 }
@@ -211,7 +212,7 @@ std::size_t Relaxation::continue_contact(Displacement& state, const ObstacleView
   return run_steps(state, obstacles, at_once);
 }
 
-// Does one of several equal parts of the steps that are left.
+// Runs one of several equal parts of the remaining steps.
 std::size_t Relaxation::run_steps(Displacement& state, const ObstacleView& obstacles,
                                   std::size_t at_once) noexcept {
   std::size_t left = work_of_planes(step_, plane_), done = 0;

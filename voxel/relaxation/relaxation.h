@@ -36,52 +36,52 @@ class Relaxation {
   explicit Relaxation(const Lattice& lattice);
   ~Relaxation();
 
-  // Spends `budget` voxel updates on average over many calls, because a cycle is not cut. Spends half of it
-  // if a contact cycle ran since the last call, and less if the object is at rest. Returns the updates spent.
+  // Spends `budget` voxel updates on average over many calls. Single calls spend more or less, because a
+  // cycle is not cut. Spends half of `budget` if a contact cycle ran since the last call, and less if the
+  // object is at rest. Returns the updates spent.
   std::uint64_t run(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                     std::uint64_t budget) noexcept;
-  // One cycle over the whole object. For references, not for the tick.
+  // Runs one cycle over the whole object. For references, not for the tick.
   void run_cycle(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held) noexcept;
-  // One cycle around the contact, which is the box of `pressed`. `pressed` is not empty and a part of `held`.
-  // If the contact is wider than kMaxNear voxels, the cycle covers its middle only; whole cycles relax the
-  // rest. `again`: another contact cycle has just ended. Under asynchronous relaxation this cycle then skips
-  // smoothing on the way to the coarse levels, which is cheaper and moves far tissue more. Returns the
-  // counted work: the number of Float8 whose prolongation would cost as much (about 45 ns each). If a cycle
-  // around a large patch costs more than `at_once`, only a part of it is done, and continue_contact() does
-  // the rest.
+  // Runs one cycle around the contact, which is the bounding box of `pressed`. `pressed` must be a non-empty
+  // part of `held`. If the contact is wider than kMaxNear voxels, the cycle covers its middle only; whole
+  // cycles relax the rest. `again`: another contact cycle has just ended. Under asynchronous relaxation this
+  // cycle then skips smoothing on the way to the coarse levels, which is cheaper and moves far tissue more.
+  // Returns the counted work: the number of Float8 whose prolongation would cost as much (about 45 ns each).
+  // If a cycle around a large patch costs more than `at_once`, only a part of it is done, and
+  // continue_contact() does the rest.
   static constexpr int kMaxNear = 64;
   static constexpr std::size_t kUnlimited = ~std::size_t{0};
   std::size_t relax_contact(Displacement& state, const ObstacleView& obstacles, std::span<const VoxelId> held,
                             std::span<const VoxelId> pressed, bool again = false,
                             std::size_t at_once = kUnlimited) noexcept;
-  // Continues that cycle in the same boxes with about `at_once` of counted work. Parts are as equal as the
-  // steps allow. Voxels may be moved between parts.
+  // Continues the cycle of relax_contact() in the same boxes with about `at_once` of counted work. Parts are
+  // as equal as the steps allow. Voxels may be moved between parts.
   std::size_t continue_contact(Displacement& state, const ObstacleView& obstacles,
                                std::span<const VoxelId> held, std::size_t at_once) noexcept;
   [[nodiscard]] bool under_way() const { return step_ > 0 || plane_ > 0; }
   // A contact cycle has a large patch if it visits more than kSmallPatch Float8 on all levels together.
-  // has_large_patch() tells that of the last or current one.
+  // has_large_patch() tells whether the last or current contact cycle has one.
   static constexpr std::size_t kSmallPatch = 2500;
-  // Factor on kSmallPatch (0 to 1). A smaller one splits more cycles, for ticks that may do less work.
+  // Factor on kSmallPatch (0 to 1). A smaller factor splits more cycles, for ticks that may do less work.
   void set_small_patch_share(double share) noexcept { small_patch_share_ = share; }
   [[nodiscard]] bool has_large_patch() const { return large_patch_; }
   // Ends a cycle that is under way; pending corrections wait for the next one.
   void end_contact() noexcept { step_ = plane_ = 0; }
 
-  // A cycle on boxes that are large enough for tissue that has to move by whole spacings. Only for a thread
-  // that has time for it. Active limits are released first, because during such motion other limits are
-  // active in each cycle. `coarse_first`, after a jump: coarse levels are relaxed to rest among themselves,
-  // and their correction is then prolonged to all voxels of the boxes at once. Returns the number of Float8
-  // visited.
+  // Runs a cycle on boxes that are large enough for tissue that has to move by whole spacings. Too slow for
+  // the tick. Active limits are released first, because during such motion each cycle has different active
+  // limits. `coarse_first`, after a jump: coarse levels are relaxed to rest among themselves, and their
+  // correction is then prolonged to all voxels of the boxes at once. Returns the number of Float8 visited.
   std::size_t relax_large_patch(Displacement& state, const ObstacleView& obstacles,
                                 std::span<const VoxelId> held, std::span<const VoxelId> pressed,
                                 bool coarse_first) noexcept;
-  // Prolongs pending corrections in those boxes and around them, and does nothing else. Returns the number of
-  // Float8 prolonged.
+  // Prolongs pending corrections in the boxes of relax_large_patch() and around them, and does nothing else.
+  // Returns the number of Float8 prolonged.
   std::size_t prolong_large_patch(Displacement& state, const ObstacleView& obstacles,
                                   std::span<const VoxelId> pressed) noexcept;
-  // A cycle over the whole object, coarse levels first. Voxels get the correction last and are not smoothed:
-  // call relax_around_blocks() after it. Returns the number of Float8 visited.
+  // Runs a cycle over the whole object, coarse levels first. Voxels get the correction last and are not
+  // smoothed: call relax_around_blocks() after it. Returns the number of Float8 visited.
   std::size_t run_whole_coarse_first(Displacement& state, const ObstacleView& obstacles,
                                      std::span<const VoxelId> held) noexcept;
   // Relaxes voxels that limits hold under the tool (AdmmRegion). Call it after cycles that do not end a
@@ -113,13 +113,13 @@ class Relaxation {
     drift_m_ = furthest_m_ = {};
   }
   [[nodiscard]] bool asleep() const { return asleep_ && !shadow_busy_; }
-  // From now on a shadow relaxes the object (shadow_object.h); here only the neighbourhood of the contact
-  // follows the tool. Allocates.
+  // From now on a shadow relaxes the object (shadow_object.h); this Relaxation only relaxes the neighbourhood
+  // of the contact. Allocates.
   void leave_to_shadow();
   [[nodiscard]] bool left_to_shadow() const { return left_to_shadow_; }
   // True while a submitted state is with the shadow.
   [[nodiscard]] bool shadow_busy() const { return shadow_busy_; }
-  // Call when the state was submitted to the shadow. Nothing is relaxed here until something moves. The
+  // Call when the state was submitted to the shadow. This Relaxation does nothing until something moves. The
   // residual near the contact is frozen, because the shadow owns it.
   void assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
@@ -141,7 +141,7 @@ class Relaxation {
   // Rows of voxels that the last contact cycle read: [first, last] of columns, j and k.
   struct NearRows {
     std::array<int, 3> first{0, 0, 0}, last{-1, -1, -1};
-    // Distance of a row from them (in rows or columns); 0: it is one of them.
+    // Distance of `row` from these rows (in rows or columns); 0: it is one of them.
     [[nodiscard]] int distance(const std::array<int, 3>& row) const {
       int most = 0;
       for (std::size_t d = 0; d < 3; ++d) most = std::max({most, first[d] - row[d], row[d] - last[d]});
@@ -192,8 +192,8 @@ class Relaxation {
 
   // ---- one cycle (v_cycle.cpp) ----
   static constexpr int kNoContact = -1;
-  // Visits of levels 2 and 3 in a cycle, each with all coarser levels. They cost little: at most a
-  // sixty-fourth of the whole object.
+  // Number of visits of levels 2 and 3 in a cycle. Each visit includes all coarser levels. Visits cost
+  // little: at most a sixty-fourth of the whole object.
   enum class Visits : std::uint8_t { once, twice };
   void lay_boxes(const std::array<int, 3>& low, const std::array<int, 3>& high, int wide, int contact_margin,
                  Visits visits) noexcept;
@@ -206,7 +206,7 @@ class Relaxation {
     int level;
     enum What : std::uint8_t { smooths, restricts, solves, prolongs, smooths_after } what;
   };
-  void list_steps();  // for both kinds of cycle; allocates
+  void list_steps();  // for each value of Visits; allocates
   void add_steps(std::vector<Step>& to, int level, Visits visits, bool again) const;
   [[nodiscard]] Step step_of(int n) const noexcept { return steps_now()[static_cast<std::size_t>(n)]; }
   [[nodiscard]] const std::vector<Step>& steps_now() const noexcept {
@@ -236,7 +236,7 @@ class Relaxation {
                   Planes planes) noexcept;
   void prolong_box(int level, Displacement& state, const ObstacleView& obstacles, Planes planes) noexcept;
   bool mark_source_cells(int level, Displacement& state, const ObstacleView& obstacles) noexcept;
-  // Coarse levels are relaxed to rest among themselves; voxels get the correction last and are not smoothed.
+  // Relaxes the coarse levels to rest among themselves. Voxels get the correction last and are not smoothed.
   void run_coarse_first(Displacement& state, const ObstacleView& obstacles) noexcept;
   void run_steps_over(int first, int last, Displacement& state, const ObstacleView& obstacles,
                       Look look) noexcept {
@@ -266,7 +266,8 @@ class Relaxation {
   bool patient_ = false;                    // rounds may take longer than a tick
   std::int64_t credit_ = 0;                 // voxel updates left; negative: overspent
   std::size_t round_left_ = 0;              // tiles left in this round
-  // Search for tiles with a pending correction above them: the next tile, and tiles searched in vain.
+  // Search for tiles with a pending correction above them: the next tile, and the number of tiles searched in
+  // vain.
   std::size_t cursor_ = 0, looked_at_ = 0;
   RowId commit_row_ = 0;  // next row whose plastic offsets are to be committed
   bool asleep_ = true, shadow_busy_ = false;

@@ -18,11 +18,12 @@ constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // a residual below this share of the least one so far is a gain
 constexpr double kNearRest = 10.0;  // (unit: tolerance) below this residual clusters at limits are moved
 constexpr double kProgress = 1e-3;  // (unit: spacing) a cluster that moves further in a step is not at rest
-// The same for links with next to no slack (unit: spacing). The object is not at rest if the mean motion of
-// all clusters on an axis exceeds its previous maximum by this much in a round. This is not tested if
-// obstacles touch the object: tissue squeezed between them would keep moving.
+// Replaces kProgress where links have next to no slack (unit: spacing). The object is not at rest if the mean
+// motion of all clusters on an axis exceeds its previous maximum by this much in a round. This is not tested
+// if obstacles touch the object: tissue squeezed between them would keep moving.
 constexpr double kDrift = 2e-5;
-// Stride that selects the voxel at an active limit that is first in the next round.
+// Stride, in voxels at active limits, from the voxel that a round moves first to the one that the next round
+// moves first.
 constexpr std::uint64_t kNextFirst = 7919;
 
 }  // namespace
@@ -111,10 +112,11 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
   // Active limits are released in every round only while rounds gain. Otherwise two active sets could
   // alternate without end.
   //
-  // AdmmRegion moves pressed voxels and all their dependents together, which is too much work for a tick.
-  // Beside a moving body each round is like the first. In both cases only limits that no voxel pulls against
-  // are released: coarse levels would move the other voxels off their limits and back. Beside fixed obstacles
-  // AdmmRegion is not used, because the per-voxel contact solver would undo its result in each tick.
+  // AdmmRegion runs beside moving bodies, and under the tool. Under the tool it runs only in rounds that may
+  // take longer than a tick, because it moves pressed voxels and all their dependents together. In both cases
+  // only limits that no voxel pulls against are released. If the other limits were released, too, coarse
+  // levels would move voxels off these limits and back. Beside fixed obstacles AdmmRegion is not used,
+  // because the per-voxel contact solver would undo its result in each tick.
   if (obstacles.moving > 0 || (tool_presses_ && patient_ && obstacles.obstacles.empty())) {
     residual_N = std::max(residual_N, region_->relax(multigrid_, state, obstacles, {}));
     credit_ -= static_cast<std::int64_t>(region_->looked_at());

@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kCoarsestSweeps = 8;
 constexpr int kContactSweeps = 4;  // sweeps on the coarsest level, under asynchronous relaxation
-// Levels of a contact cycle under asynchronous relaxation. The shadow relaxes tissue further away. If both
-// moved the coarsest cells, they would disturb one another.
+// Levels of a contact cycle under asynchronous relaxation. The shadow relaxes tissue further away. If contact
+// cycles moved the coarsest cells, too, they would disturb the shadow's cycles, and conversely.
 constexpr int kContactLevels = 5;
 // Cost of smoothing and of restricting a Float8 of cells (unit: Float8 prolonged). kOfVoxels: factor for
 // voxels, which have limits and obstacles.
@@ -18,7 +18,7 @@ constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
 // Further cycles on the coarse levels alone before voxels get the correction. Each costs an eighth of a whole
 // cycle.
 constexpr int kCoarseCycles = 2;
-constexpr int kRoundParts = 4;  // voxels around a rigid block that its cycle relaxes
+constexpr int kRoundParts = 4;  // margin of voxels around a rigid block in relax_around_blocks()
 // Levels that are visited twice in a cycle. If they were visited once, they would leave an error around a
 // held patch.
 constexpr int kFirstTwice = 2, kLastTwice = 3;
@@ -68,8 +68,8 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
       to[d] = std::min(multigrid_.grid(l).dims[d] - 1, (high[d] >> l) + margin);
     }
     // The box is extended to whole cells of the next level, so that all children of a restricted cell are
-    // smoothed. The exception is level 0 around a contact along x: there the outermost cells may have
-    // children that are not smoothed. Whole cells would double the width and gain nothing.
+    // smoothed. The exception is the x direction on level 0 around a contact. There the outermost cells may
+    // have children that are not smoothed: whole cells would double the width and gain nothing.
     const bool narrow = wide != kNoContact && l == 0;
     const int pair = narrow ? 0 : 1;
     RowBox& s = boxes(l).smoothed;
@@ -173,8 +173,8 @@ std::size_t Relaxation::work_of_step(int n) const noexcept {
 }
 
 // Red-black smoothing by rows. The second colour follows one plane behind the first, while that plane is in
-// the cache. The result is bit for bit that of one colour after the other: along x a row's neighbours have
-// its own colour, and come in the same order.
+// the cache. The result equals, bit for bit, that of smoothing one colour after the other: a row's neighbours
+// along x have the row's own colour and are smoothed in the same order.
 void Relaxation::smooth_box(int level, int first_colour, Displacement& state, const ObstacleView& obstacles,
                             Look look, Planes planes) noexcept {
   const RowBox& all = boxes(level).smoothed;
@@ -206,9 +206,9 @@ void Relaxation::smooth_box(int level, int first_colour, Displacement& state, co
   }
 }
 
-// Prolongs the pending corrections of the next coarser level within the boxes. Cells beside the box always
-// prolong, however small their correction is, because nothing relaxes their children here. Children left
-// behind would act on the box like a force, four times as much on each coarser level.
+// Prolongs the pending corrections of the next coarser level within the boxes. Cells beside the box prolong,
+// too, because nothing relaxes their children here. Children left behind would act on the box like a force,
+// four times as much on each coarser level.
 void Relaxation::prolong_box(int level, Displacement& state, const ObstacleView& obstacles,
                              Planes planes) noexcept {
   if (planes.first == 0) any_source_ = mark_source_cells(level, state, obstacles);

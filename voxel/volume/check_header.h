@@ -48,7 +48,7 @@ struct VoxelPlace {
   std::optional<double> unit_m;  // length unit that the header states
   std::string stated_unit;       // as the header spells it; empty if it states none
   bool directions_known = true;  // the header says how the axes lie in the patient
-  std::size_t axes = 3;          // axes of the lattice that the header gives
+  std::size_t axes = 3;          // number of axes that the header gives
   std::vector<std::string> notes;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Recognises files that stand in the place of a volume but are none. Internal to the readers (read_volume.h).
+// Recognises files that stand in the place of a volume but are not volumes. Internal to the readers
+// (read_volume.h).
 #pragma once
 
 #include <filesystem>

@@ -213,7 +213,8 @@ bool differ(const NiftiAffine& p, const NiftiAffine& q, const glm::dvec3& spacin
 }
 
 // Sets the frame in LPS. The sform is used if it is rectangular and gives scanner coordinates, or if there is
-// no qform. Otherwise the qform is used. ITK chooses in the same way, so its programs show the same place.
+// no qform. Otherwise the qform is used. ITK makes the same choice, so programs built on ITK show the volume
+// at the same place.
 void read_nifti_frame(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
   constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
   check_nifti_frame(path, header);

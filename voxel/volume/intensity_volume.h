@@ -12,12 +12,13 @@ namespace voxel {
 
 struct IntensityVolume {
   LabelVolume labels;
-  // Of each voxel of `labels`, in the file's own numbers; empty where they do not fit into the limit.
+  // Intensity of each voxel of `labels`, in the file's own numbers. Empty if the intensities do not fit into
+  // max_bytes.
   std::vector<float> intensities;
   bool whole_numbers = false;  // the file holds whole numbers only
 };
 
-// As load_volume(), with the intensities where they fit into options.max_bytes. Throws VolumeError.
+// Like load_volume(), but also loads the intensities if they fit into options.max_bytes. Throws VolumeError.
 IntensityVolume load_intensities(const std::filesystem::path& path, const VolumeFileOptions& options,
                                  std::vector<std::string>* notes = nullptr);
 

@@ -28,7 +28,7 @@ struct Thinned {
   // [label] Label of the struts of `label`, which was unused before; 0 if `label` has no struts. A strut
   // replaces a column of n × n voxels, n = `every`. So the material of the struts must be n² times as stiff
   // as that of `label`. Then n links of a strut in series equal one link of a lattice with n times the
-  // spacing, both in stiffness (n²·E·h / n = E·n·h) and in limits. Links of a strut have full weight, as
+  // spacing, both in stiffness (n²·E·h / n = E·n·h) and in limits. Links of a strut have full weight, like
   // those of any row of voxels (voxel/lattice/link_stiffness.h).
   std::array<std::uint8_t, 256> strut_label{};
   std::size_t stiff = 0;    // voxels of the stiff labels before thinning

@@ -7,9 +7,9 @@
 
 namespace voxel {
 
-// The unit in meters. Known are the meter with the prefixes kilo, deci, centi, milli, micro and nano (short
-// or in full, in American or British spelling), the micron, the inch and the foot. Case, quotes and blanks do
-// not matter. Empty if the word is no such unit.
+// The unit in meters. Known units are the meter, alone or with the prefixes kilo, deci, centi, milli, micro
+// and nano (short or in full, in American or British spelling), the micron, the inch and the foot. Case,
+// quotes and blanks do not matter. Empty if the word is no such unit.
 std::optional<double> length_unit_m(const std::string& word);
 
 // The unit as text, such as "mm". A unit without a metric name gives "0.0254 m".

@@ -10,8 +10,8 @@
 namespace voxel {
 
 // Reads the number at the start of a text, after blanks. The decimal mark is a point in every locale. Sets
-// `end` behind the number, or to `at` if there is none. As strtod() has it, a number too large for a double
-// gives an infinity of its sign, and one too small gives 0.
+// `end` behind the number, or to `at` if there is none. As in strtod(), a number too large for a double gives
+// ±infinity, and a number too small gives 0.
 inline double number_at(const char* at, const char** end) {
   const char* first = at;
   while (*first == ' ' || (*first >= '\t' && *first <= '\r')) ++first;

@@ -37,7 +37,7 @@ std::size_t size_of(Component component);  // (unit: byte)
 struct VolumeData {
   VolumeHeader header;
   Component component = Component::uint8;
-  bool reversed = false;  // the header's first axis runs against the file's
+  bool reversed = false;  // the first axis in `header` is the reverse of the file's
 
   [[nodiscard]] std::size_t slice_bytes() const {
     return header.bytes / static_cast<std::size_t>(header.dims[2]);
@@ -68,7 +68,7 @@ struct FileFrame {
 };
 
 // Completes a frame whose file gives only the first `given` axes (0 to 3). The missing axes have one voxel.
-// They get directions at right angles to the others.
+// They get directions at right angles to the given axes.
 void complete_axes(FileFrame& frame, std::size_t given);
 
 // Checks the frame and fills the header's dims, spacing, origin, rotation, component and bytes. Throws
@@ -76,14 +76,14 @@ void complete_axes(FileFrame& frame, std::size_t given);
 void set_frame(const std::filesystem::path& path, const FileFrame& frame, Component component, double unit_m,
                VolumeData& data);
 
-// Throws VolumeError, with the numbers, if reading would need more than max_bytes: `copies` of the voxels,
-// one slice and the labels.
+// Throws VolumeError, with the numbers, if reading would need more than max_bytes. Counted are `copies`
+// copies of the voxels, one slice and the labels.
 void check_memory(const std::filesystem::path& path, const VolumeData& data, double copies,
                   const std::optional<glm::dvec3>& spacing_m, std::uint64_t max_bytes);
 
 // Labels of the voxels, resampled if options.spacing_m is set. Calls `next` once for every slice.
-// `intensities` (may be null) receives those of the same voxels; it stays empty where they do not fit into
-// options.max_bytes.
+// `intensities` (may be null) receives the intensities of the labelled voxels. It stays empty if they do not
+// fit into options.max_bytes.
 LabelVolume label_voxels(const std::filesystem::path& path, const VolumeData& data, const NextSlice& next,
                          const VolumeFileOptions& options, std::vector<float>* intensities = nullptr);
 

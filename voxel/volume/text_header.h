@@ -35,8 +35,8 @@ TextHeader read_text_header(const std::filesystem::path& path, char separator, c
 // Finds the file of the voxels that the header names. Throws VolumeError.
 void find_data_file(const std::filesystem::path& header, const std::string& name, VoxelPlace& place);
 
-// A byte count in a header; 0 if absent. -1 means that the voxels are at the end of the file and gives 0,
-// too. Throws VolumeError.
+// A byte count in a header. Returns 0 if the field is absent or is -1, which means that the voxels are at the
+// end of the file. Throws VolumeError.
 std::uint64_t bytes_to_skip(const std::filesystem::path& path, const TextHeader& header,
                             const std::string& key);
 

@@ -12,8 +12,8 @@ namespace voxel {
 // the mean displacement of the filled voxels around it. A voxel of the result has the label of the box that
 // contains its centre. The boxes tile the tissue before and after, so stretched tissue has no holes. Moving
 // voxel by voxel would leave holes. The field is not inverted: an inversion iterates, and fails where tissue
-// is sheared by more than its own thickness. Where tissue has folded over itself, a box at rest wins. If
-// there is none, the first box in the order of the voxels wins.
+// is sheared by more than its own thickness. Where tissue has folded over itself, a box that has not moved
+// wins. If there is none, the first box in the order of the voxels wins.
 //
 // `displacement` is in meters along the axes of the volume, at the voxels' places at rest; it is ignored
 // where the label is 0. The result is on the same lattice, enlarged by whole voxels if tissue left it. Extra
