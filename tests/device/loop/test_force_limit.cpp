@@ -25,7 +25,7 @@ bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// A random command of any magnitude of a double, including NaN and infinities.
+// A random command. Its components cover all magnitudes of a double, NaN and infinities.
 glm::dvec3 wild_command(std::mt19937_64& random) {
   std::uniform_real_distribution<double> exponent(-320.0, 308.0), sign(-1.0, 1.0);
   std::uniform_int_distribution<int> kind(0, 39);

@@ -50,8 +50,8 @@ TEST(LoopStability, AMassThatHardlyCountsLeavesAnIntegrator) {
 }
 
 TEST(LoopStability, SlowLoopsFollowGil) {
-  // Gil, Sanchez, Hulin, Preusche & Hirzinger (2009): K < (b + B) / (T/2 + delay), if the mass is large
-  // compared with what the damping stops within a period.
+  // Gil, Sanchez, Hulin, Preusche & Hirzinger (2009): K < (b + B) / (T/2 + delay), if the mass is much larger
+  // than the damping times the period.
   const double b = 0.4, T = 1e-3;
   for (const double B : {0.0, 1.0, 4.0}) {
     for (int d = 0; d <= 2; ++d) {
@@ -75,7 +75,7 @@ TEST(LoopStability, TooMuchSampledDampingIsUnstableByItself) {
             0.0);
 }
 
-// Simulates the mechanics with a hand's spring step by step, with the closed form of the underdamped
+// Simulates mechanism and hand tick by tick. Within a tick the motion is the closed form of the underdamped
 // oscillator.
 TEST(LoopStability, RadiusIsTheRateAtWhichAMotionGrows) {
   const double m = 0.08, b = 5.0, k_hand = 600.0, T = 1e-3, decay = 0.5 * b / m;

@@ -76,7 +76,7 @@ class Mutator {
     if (below(2) == 0) {
       const std::uint32_t value = kWords[below(kWords.size())];
       std::memcpy(bytes.data() + at, &value, 4);
-    } else {  // copies one vertex or facet over another
+    } else {  // copies 1 to 12 bytes over others: a byte, a number or three numbers
       static constexpr std::array<std::size_t, 4> kLengths{1, 4, 8, 12};
       const std::size_t length = kLengths[below(4)];
       const std::string copy = bytes.substr(below(bytes.size() - length), length);

@@ -99,8 +99,8 @@ TEST(CrossableEdges, TrianglesNeedNotBeOrientedAlike) {
   EXPECT_GT(edges.sides[0].plane.normal.z, 0.9);
 }
 
-// The half-plane through the edge that bisects the angle divides the goals. Beyond it by more than the
-// hysteresis the other side is nearer; before it no side is.
+// The bisecting plane of the two offset planes divides the goals. If a goal lies beyond it by more than the
+// hysteresis, the other side is nearer. If the goal lies before it, no other side is nearer.
 TEST(CrossableEdges, TheNearerSideIsBeyondTheBisector) {
   for (const double degrees : {0.01, 1.0, 10.0, 29.0}) {
     const polygon::CrossableEdges edges = crossable_edges_of_first(roof(degrees));
@@ -118,7 +118,8 @@ TEST(CrossableEdges, TheNearerSideIsBeyondTheBisector) {
       ASSERT_NE(side, nullptr) << degrees << " " << part;
       EXPECT_EQ(side->element, 1U);
       const polygon::EdgeCrossing way = polygon::cross_edge(edges, *side, goal);
-      // As exactly as the planes define their line.
+      // The planes' line of intersection is defined no better than this, because the planes meet at a small
+      // angle.
       EXPECT_LT(glm::length(way.top - mitre), 1e-16 / half);
       EXPECT_LT(std::abs(way.top.z - kRadius), 1e-17);
       const dvec3 normal(std::sin(2 * half), 0, std::cos(2 * half));

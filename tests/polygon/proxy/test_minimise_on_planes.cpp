@@ -21,8 +21,7 @@ using polygon::ContactPlane;
 using polygon::minimise_on_planes;
 using polygon::PlaneMinimum;
 
-constexpr double kTolerance =
-    1e-15;  // of the planes, as the sweep asks: a millionth of a millionth of a 1 mm tool
+constexpr double kTolerance = 1e-15;  // m; of the planes: 1e-12 times the radius of a tool of 1 mm
 
 dvec3 random_vector(std::mt19937_64& random, double size) {
   std::normal_distribution<double> normal(0.0, size);
@@ -205,7 +204,7 @@ TEST_F(MinimiseOnPlanes, PlanesThroughTheProxyItselfHoldItAsBruteForceSays) {
     const dvec3 proxy = random_vector(random, 1e-2);
     std::vector<ContactPlane> planes;
     for (int i = 0; i < 3 + n % 8; ++i) {
-      // All in one half-space, so that a free direction exists.
+      // All normals lie in one half-space, so that a free direction exists.
       dvec3 normal = random_direction(random);
       normal.z = std::fabs(normal.z) + 0.01;
       normal = glm::normalize(normal);
@@ -252,7 +251,7 @@ TEST_F(MinimiseOnPlanes, PlanesThatAreNearlyParallelAreNoDeadEnd) {
                                             glm::dot(glm::normalize(normal + angle * across), proxy), 0, 1},
                                            {glm::normalize(normal - angle * across),
                                             glm::dot(glm::normalize(normal - angle * across), proxy), 0, 2}};
-    // The target is in the wedge between them.
+    // From the proxy, the target lies within the cone of the inward normals. So the proxy is the minimum.
     std::uniform_real_distribution<double> share(-1.0, 1.0);
     const dvec3 target = proxy - 3e-3 * normal + 3e-3 * share(random) * angle * across;
     const PlaneMinimum found = minimise_on_planes(target, dmat3(1000.0), planes, 1e-15);
@@ -292,7 +291,8 @@ TEST_F(MinimiseOnPlanes, AgreesWithBruteForceOnWhetherThereIsRoom) {
       planes.push_back({random_direction(random), offset(random), 0, static_cast<std::uint32_t>(i)});
     const dvec3 target = random_vector(random, 1.0);
     const bool strict = brute_force(target, dmat3(1.0), planes, 1e-12).has_value();
-    if (strict != brute_force(target, dmat3(1.0), planes, 1e-8).has_value()) continue;  // too near to call
+    if (strict != brute_force(target, dmat3(1.0), planes, 1e-8).has_value())
+      continue;  // feasible only within rounding
     const PlaneMinimum found = minimise_on_planes(target, dmat3(1.0), planes, kTolerance);
     EXPECT_EQ(found.feasible, strict) << n;
     without += strict ? 0 : 1;

@@ -93,7 +93,8 @@ TEST_P(NeighbourhoodTest, SeparatingPlanesHaveTheirElementBehindThem) {
         EXPECT_LE(glm::dot(own.normal, mesh_.vertices[corner]) + radius(), own.offset + 1e-15);
       }
     }
-    // Perpendicular to the shortest line the plane is as far away as possible: the ball would just touch.
+    // The plane is perpendicular to the shortest line from the view to the element. Its distance from the
+    // view is the greatest possible: a ball on the plane would just touch the element.
     EXPECT_NEAR(plane.offset - radius(), glm::dot(plane.normal, view) - distance(t, view), 1e-12);
     if (flat) {
       EXPECT_GE(glm::dot(own.normal, view), own.offset - 1e-15);
@@ -118,7 +119,7 @@ TEST(Neighbourhood, KnowsNothingUntilAskedAndHowMuchRoomThereIs) {
   EXPECT_LT(near.margin_left(dvec3(0.0)), 0.0);
   const auto ball = polygon::make_ball_surface(0.02);
   ASSERT_TRUE(near.survey(*ball, dvec3(0, 0, 0.03), 0.005, 1e-3, dvec3(0, 0, 0.03)));
-  EXPECT_EQ(near.size(), 0U);  // further than 6 mm
+  EXPECT_EQ(near.size(), 0U);  // the ball's surface is further away than margin and radius together, 6 mm
   EXPECT_DOUBLE_EQ(near.margin_left(dvec3(0, 0, 0.032)), 0.003);
   ASSERT_TRUE(near.survey(*ball, dvec3(0, 0, 0.025), 0.005, 1e-3, dvec3(0, 0, 0.025)));
   EXPECT_EQ(near.size(), 1U);

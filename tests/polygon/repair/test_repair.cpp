@@ -129,7 +129,7 @@ TEST(RepairHoles, SmallOnesAreFilledAndSaid) {
   EXPECT_TRUE(check.findings.empty()) << tests::in_short(check.findings);
   EXPECT_EQ(count_of(repaired.changes, "R13"), 2U);
   EXPECT_EQ(count_of(repaired.changes, "R04"), 0U) << "fills agree with the triangles they meet";
-  // A cap of radius 0.2 is 0.02 high, so flat fills lose 0.02 % of the ball's volume.
+  // A cap of radius 0.2 is 0.02 high, so a flat fill loses 0.03 % of the ball's volume.
   EXPECT_NEAR(check.volume_m3, tests::signed_volume(ball), 2e-3);
   EXPECT_LT(check.volume_m3, tests::signed_volume(ball));
   const Finding* filled = find_finding(repaired.changes, "R13");

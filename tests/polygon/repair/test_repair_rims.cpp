@@ -84,7 +84,8 @@ TEST(RepairRims, HolesThatTouchInAVertexAreFilledEach) {
   }
 }
 
-// At a crease, the triangles beside a hole do not tell which way leads around the point in the hole's plane.
+// Two holes touch at a corner point on a crease. There a triangle may lie across the plane of a gap, so the
+// triangle does not tell on which side of the point the gap lies.
 TEST(RepairRims, HolesThatTouchOnACreaseAreFilledEach) {
   const TriangleMesh box = make_box_mesh(glm::dvec3(0.5), 4);
   const auto centre = [&](std::uint32_t t) {

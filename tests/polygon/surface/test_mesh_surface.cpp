@@ -149,7 +149,7 @@ TEST_P(MeshSurfacePlaced, InsideIsTheWindingNumber) {
       ASSERT_FALSE(sheet->inside(p)) << "an open sheet has no inside";
     }
     EXPECT_GT(in, 3);
-    // Points straight out of and into every corner and edge need pseudonormals.
+    // Just outside and just inside of a corner, inside() is right only with pseudonormals.
     for (const glm::dvec3& v : mesh.vertices) {
       const glm::dvec3 d = (v - offset) * 1e-4;
       ASSERT_FALSE(surface->inside(v + d));
@@ -227,7 +227,7 @@ TEST(MeshSurface, FullOutputKeepsTheNearest) {
         EXPECT_LT(few[k - 1].element, few[k].element);
       }
     }
-    // An output that fits exactly is complete.
+    // The answer is complete if the output has exactly the size that is needed.
     std::vector<NearPoint> exact(count);
     EXPECT_TRUE(surface->gather(p, 0.6, exact).complete);
     const GatherResult none = surface->gather(p, 0.6, {});

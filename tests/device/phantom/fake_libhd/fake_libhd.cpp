@@ -349,7 +349,7 @@ void hdUnschedule(unsigned long /*schedule*/) {
 
 #ifdef FAKE_HD_NEEDS_DRIVER
 extern "C" int fake_phantom_io();
-// Refers to the other library, so that this one cannot be loaded without it.
+// Refers to the library of fake_phantom_io.cpp, so that this library cannot be loaded without that one.
 extern "C" int fake_hd_needs() {
   return fake_phantom_io();
 }
