@@ -83,8 +83,8 @@ void expect_the_limit_from_either_side(const polygon::RigidSurface& surface, con
     return on(surface, where.position_m + where.rotation * device, where).force_N;
   };
   constexpr double kHeight_m = 1e-8;
-  // The force changes by K times the height, and its direction by the rounding of the height: 1e-16 m of
-  // 1e-8.
+  // The magnitude of the force changes by K times the height. Its direction changes by the relative rounding
+  // of the height, 1e-16 m of 1e-8 m.
   constexpr double kSlack_N = 2.0 * kStiffness * kHeight_m;
   for (const hybrid::Pose& where : {hybrid::Pose{}, pose}) {
     const glm::dvec3 felt = force(0.0, where);

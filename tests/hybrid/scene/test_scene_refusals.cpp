@@ -404,7 +404,7 @@ TEST_F(SceneRefusal, Latin1IsNamedWithItsLine) {
   EXPECT_NE(said.find("Latin-1"), std::string::npos) << said;
   EXPECT_NE(said.find("'\u00E4'"), std::string::npos) << said;
   EXPECT_NE(said.find("save the file as UTF-8"), std::string::npos) << said;
-  // The same holds in a comment. A text that is cut within a character is neither Latin-1 nor UTF-8.
+  // Latin-1 is also found in a comment. A text that is cut within a character is neither Latin-1 nor UTF-8.
   EXPECT_NE(refusal("format = 1 # f\xFCr\n").find(":1:15: "), std::string::npos);
   EXPECT_NE(refusal("format = 1 # \xE2\x82\n").find("not utf-8"), std::string::npos);
   EXPECT_EQ(refusal("format = 1\ntitle = \"Sch\u00E4del\"\n" + block + path), "");

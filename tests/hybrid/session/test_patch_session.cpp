@@ -190,8 +190,8 @@ TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // 0.35 of the least just noticeable difference
 }
 
-// A ball with a radius of 2.5 spacings, up to four spacings deep. With wide and with active limits, its force
-// must be that of the same links relaxed one by one. It must not oscillate.
+// A ball with a radius of 2.5 spacings is pressed up to four spacings deep, with wide limits and with active
+// limits. Its force must be that of the same links relaxed one by one, and must not oscillate.
 TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
   // Near a body that may move, an object is relaxed link by link.
   const std::string body =
@@ -202,8 +202,8 @@ TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
     const char* limits;
     double tolerance, still;  // relative to the force
   };
-  // At limits, the links' force on a voxel is not known. So the voxel swings sideways by a fiftieth of a
-  // spacing.
+  // If links are at their limits, their force on a voxel is not known. So the voxel swings sideways by a
+  // fiftieth of a spacing, and the second row has wider tolerances.
   for (const auto& [limits, tolerance, still] :
        {Row{"[0.01, 2.5]\nshear = 2", 0.01, 1e-3}, Row{"[0.5, 1.5]\nshear = 0.5", 0.025, 0.01}}) {
     std::string text = block("spacing = 2\n");
@@ -252,8 +252,9 @@ TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   }
 }
 
-// On closed paths, slow or fast, frictionless tissue gives the hand no energy. The paths are down and up,
-// then down, aside, up and back, and the latter in reverse. Aside, the tissue is 1 % softer.
+// On closed paths, slow or fast, frictionless tissue gives the hand no energy. The first path is down and up.
+// The second is down, aside, up and back. The third is the second in reverse. At the place aside, the tissue
+// is 1 % softer.
 TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   const glm::dvec3 above(0.0, 0.0, 0.043), deep(0.0, 0.0, 0.037), aside(0.005, 0.0, 0.0);
   const std::vector<std::vector<glm::dvec3>> paths{

@@ -64,8 +64,8 @@ TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
   EXPECT_GT(itself.still.ticks, 50U);
   EXPECT_EQ(itself.moving.max_jnd, 0.0);
   EXPECT_EQ(itself.still.max_jnd, 0.0);
-  // Slowed down by a factor of 1, the truth is the session itself, because so small a block has no patches to
-  // widen.
+  // With a slow-down factor of 1, the truth is the session itself. The block is too small for patches, which
+  // a slow run would widen.
   EXPECT_EQ(error(slow(1), hybrid::play_setting(scene, kBlock, motion, {}).course).worst_jnd(), 0.0);
 }
 

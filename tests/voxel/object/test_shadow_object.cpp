@@ -77,8 +77,8 @@ TEST(ShadowObject, AHeldContactComesToTheSameRest) {
   }
 }
 
-// The contact stays at rest for any number of exchanges. The two solvers must each find a part of the motion,
-// and not both the same part.
+// The contact stays at rest for any number of exchanges. The tick and the shadow each relax a part of the
+// motion, and must not both apply the same part.
 TEST(ShadowObject, AHeldContactStaysAtRest) {
   SoftBlock soft({41, 37, 25}, kH, kFirm);
   ShadowObject shadow(*soft.object);

@@ -80,12 +80,12 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
 TEST(SoftYield, TheWeakestLinkTakesWhatIsBeyond) {
   const double weak = 0.02, pressed = 0.5 * kH;
   Column column(0.2, weak);
-  // Eight links stretch by the force at which the ninth yields. The ninth takes the rest.
+  // Eight links are compressed by the force at which the ninth yields. The ninth takes the rest.
   EXPECT_NEAR(column.hold_at(-pressed), kStiffness * weak * kH, 2e-3 * kStiffness * weak * kH);
   EXPECT_NEAR(column.let_go(), -(pressed - 9 * weak * kH), 2e-3 * pressed);
 }
 
-// Pressed by a ball, released, and pressed half as deep again.
+// A block that a ball presses and then leaves.
 struct Dented {
   static constexpr std::array<int, 3> kSize{25, 25, 17};
 

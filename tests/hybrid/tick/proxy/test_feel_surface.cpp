@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Shading, texture and damping in the whole tick. The shaded force is along the normal of the surface that
-// the facets approximate. A relief has its wavelength, and damping only resists.
+// the facets approximate. The force over a relief has the wavelength of the relief. Damping only resists.
 #include <gtest/gtest.h>
 
 #include <algorithm>
