@@ -37,7 +37,8 @@ struct Broken {
   const char* wrong;   // part of the error's text
   const char* remedy;  // part of the remedy's text
 };
-// Without this, a case would be listed by the bytes of its pointers, which differ between runs.
+// Names a case by its file. By default GoogleTest prints a case's bytes, and the pointers in it differ
+// between runs.
 void PrintTo(const Broken& scene, std::ostream* out) {
   *out << scene.file;
 }

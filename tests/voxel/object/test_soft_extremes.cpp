@@ -35,7 +35,7 @@ struct Extreme {
 struct Outcome {
   bool finite = true;
   double violation_spacings =
-      0.0;  // largest violation of a limit, relative to the largest displacement or one spacing
+      0.0;  // largest violation of a limit, relative to the larger of one spacing and the displacement
   double most_force_N = 0.0;
   double left_spacings = 0.0;  // displacement left at the end
   bool asleep = false;

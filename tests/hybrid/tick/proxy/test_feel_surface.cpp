@@ -200,7 +200,7 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
         std::printf("energy, %s%s, %s: the hand gains %+.3g mJ\n", image ? "image" : "pattern",
                     friction ? ", rough" : "", way.name, 1e3 * gain.work_J);
         // Between ticks the force is not linear along the path. So the trapezoidal rule has an error of a
-        // millionth of the exchanged energy. It vanishes with the step.
+        // millionth of the exchanged energy. The error vanishes with the step.
         EXPECT_LE(gain.work_J, friction ? 0.0 : 1e-8);
       }
     }
