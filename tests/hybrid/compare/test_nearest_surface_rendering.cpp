@@ -140,7 +140,7 @@ TEST_F(ProxyOrNot, TheThinPlateThrowsTheToolOutBehindWithoutAProxy) {
     most = std::max(most, classic[n].force_N.z);
     least_proxy = std::min(least_proxy, proxy[n].force_N.z);
     if (n > 0) step = std::max(step, std::fabs(proxy[n].force_N.z - proxy[n - 1].force_N.z));
-    // The proxy's force is that of the whole depth, towards the side from which the tool came.
+    // The proxy's force belongs to the whole depth, and points to the side from which the tool came.
     const double depth = 2e-3 - proxy[n].device_m.z;
     ASSERT_NEAR(proxy[n].force_N.z, kStiffness * std::max(0.0, depth), 1e-6);
     ASSERT_GE(proxy[n].proxy_m.z, 2e-3 - 1e-9);

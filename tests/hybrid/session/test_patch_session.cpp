@@ -106,8 +106,8 @@ TEST_F(GridSession, TheWindowShowsTheDent) {
   for (const glm::vec3& moved : shown()) ASSERT_EQ(moved, glm::vec3(0.0F));
 }
 
-// If the chain is tight over nearly the whole object, the force must be that at rest. Relaxation of single
-// links stalls in this case. Objects that fit into one patch and larger ones are tested. Then the tool is
+// If the chain is tight over nearly the whole object, the force must equal the force at rest. Relaxation of
+// single links stalls in this case. Tests objects that fit into one patch, and larger ones. Then the tool is
 // held still, and the force must stay the same from tick to tick.
 TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   for (const int edge : {24, 38, 58}) {
@@ -145,8 +145,8 @@ std::string layers(const std::array<int, 3>& young, const char* play) {
   return text;
 }
 
-// Skin, fat and muscle with a tight chain. The fat between the others is squeezed to its limits. The force
-// must be that at rest, also while the tool moves.
+// Skin, fat and muscle with a tight chain. The fat between skin and muscle is squeezed to its limits. The
+// force must equal the force at rest, also while the tool moves.
 TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   constexpr std::array alike{20000, 5000, 10000}, real{100000, 3250, 11100};  // (Pa)
   for (const auto& [young, play] : {std::pair{alike, "[0.9, 1.1]\nshear = 0.1"},
@@ -173,7 +173,7 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
 }
 
 // A ball with a radius of nine spacings is pressed five spacings deep at 0.1 m/s, with no active limit. The
-// force must be that at rest.
+// force must equal the force at rest.
 TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   std::string text = block("spacing = 1\n");
   const auto put = [&](const std::string& what, const std::string& with) {
@@ -237,7 +237,7 @@ TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
 }
 
 // Distant tissue must follow at once, inwards and outwards. A step of a tenth of a spacing changes the force
-// by an eighth. One tick later the force must be that at rest.
+// by an eighth. One tick later the force must equal the force at rest.
 TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   const hybrid::Scene scene = load(block("spacing = 1\n"));
   for (const double step_m : {-1e-4, 1e-4}) {
@@ -332,9 +332,9 @@ double overlap(tests::Touch& touch) {
   return most;
 }
 
-// The tool presses tissue onto a bone. While it moves, the force is that at rest. Hand, bone and anchors
-// balance. The bone is outside the finest patch, so voxels between coarse nodes may overlap it by a fiftieth
-// of a spacing.
+// The tool presses tissue onto a bone. While the tool moves, the force equals the force at rest. The forces
+// of hand, bone and anchors balance. The bone is outside the finest patch, so voxels between coarse nodes may
+// overlap it by a fiftieth of a spacing.
 TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
   for (const double turned_deg : {0.0, 180.0}) {
     const hybrid::Scene scene = load(slab_on_bone(turned_deg));
@@ -366,7 +366,7 @@ TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
   }
 }
 
-// After a contact, tissue is at rest at once, and its obstacles are those at rest.
+// After a contact, tissue is at rest at once, and has the same obstacles as before the contact.
 TEST_F(GridSession, ObstaclesAreThoseOfRestAfterAContact) {
   tests::Touch touch(load(slab_on_bone(0.0)), {0.0, 0.0, 0.019}, true);
   const auto obstacles = touch.state().soft[0]->obstacles();

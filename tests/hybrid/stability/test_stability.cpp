@@ -76,7 +76,8 @@ TEST(MeasuredStability, TheEnvelopeGrowsByTheSpectralRadius) {
 
 // ---- passivity ------------------------------------------------------------------------------------------
 
-// At every frequency, the measured damping that absorbs the energy from the wall equals that of the formula.
+// At every frequency, the measured damping that absorbs the energy from the wall equals the damping of the
+// formula.
 TEST(MeasuredPassivity, EveryFrequencyNeedsTheDampingOfTheFormula) {
   constexpr double kStiffness = 1500.0;
   for (const LoopSetting& setting : {bare(1.0), bare(1.0, 1), bare(1.0, 2, 0.8), bare(1.0, 0, 2.0, 4000.0)}) {

@@ -181,7 +181,7 @@ TEST_F(Tune, SettingsBesideOneChangeOneObject) {
   ASSERT_EQ(objects.size(), 2U);
   const auto own = hybrid::own_setting(objects);
   const auto beside = hybrid::settings_beside(objects, own);
-  EXPECT_EQ(beside.size(), 8U);  // of each object: coarser, finer, the other energy, rigid
+  EXPECT_EQ(beside.size(), 8U);  // for each object: coarser, finer, the other energy, rigid
   for (const auto& setting : beside)
     EXPECT_EQ((setting.objects[0] == own.objects[0]) + (setting.objects[1] == own.objects[1]), 1);
   for (const auto& setting : hybrid::common_settings(objects, false))

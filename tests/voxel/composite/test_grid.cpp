@@ -137,7 +137,7 @@ Difference compare(const Body& body, const PressedSquare& patch, int half_width)
   return most;
 }
 
-// If level 0 covers the object, the result is that of the lattice, whatever its dimensions.
+// If level 0 covers the object, the result is the lattice's equilibrium, whatever the object's dimensions.
 TEST(CompositeGrid, AllVoxelsAreTheLatticeAtEquilibrium) {
   for (const Index3& dims : {Index3{13, 13, 11}, Index3{12, 15, 10}, Index3{9, 16, 14}}) {
     for (const double depth : {0.3, 1.0}) {

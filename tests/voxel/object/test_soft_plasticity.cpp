@@ -70,7 +70,7 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
   // at twice the yield strain, half of the strain stays
   EXPECT_NEAR(column.hold_at(-2.0 * most), kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
-  // from there it is elastic up to the previous depth, and up to yield in the other direction
+  // from there the row is elastic up to the previous depth, and up to yield in the other direction
   EXPECT_NEAR(column.hold_at(-1.5 * most), 0.5 * kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
   EXPECT_NEAR(column.hold_at(1.0 * most), -kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rank test against all permutations, its approximation against the exact test, and how often it calls
-// two samples of the same distribution different.
+// The rank test against all permutations, and its approximation against the exact test. Also tests how often
+// two samples of the same distribution are called different.
 #include "hybrid/bench/reports/rank_test.h"
 
 #include <gtest/gtest.h>

@@ -58,8 +58,8 @@ double p99(const std::vector<double>& sorted) {
 class Shading : public Feel, public ::testing::WithParamInterface<double> {};
 
 // The reference normal is the sphere's normal at the proxy, the direction from the ball's centre to the
-// proxy. At the device it is the same within the measured angle, because the force points from the device to
-// the proxy.
+// proxy. The sphere's normal at the device is the same within the measured angle, because the force points
+// from the device to the proxy.
 TEST_P(Shading, TurnsTheForceToTheSphereThatTheFacetsStandFor) {
   RigidDescription flat = ball(), smooth = ball();
   smooth.feel.shading = true;
