@@ -91,7 +91,7 @@ TEST(BenchSoft, SessionsAndLoadsSayWhatTheyAre) {
   EXPECT_TRUE(rows[1].force_error_N && rows[1].force_error_jnd && rows[1].truncated_share);
 }
 
-// The thesis's figure 22: a corner that both of its links move oscillates for ever. The project's own tissue
+// Thesis, Fig 22: if both links of a corner move it, the corner oscillates for ever. The project's own tissue
 // comes to rest at once.
 TEST(BenchSoft, ClassicOscillatesForEverAndOursSettles) {
   const auto objects = hybrid::bench::measure_settling(60);

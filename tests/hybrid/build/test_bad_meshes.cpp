@@ -112,7 +112,7 @@ void press_and_slide(const std::filesystem::path& file, double unit_m, bool repa
     ++ticks;
     ASSERT_TRUE(tests::finite(felt.force_N) && tests::finite(felt.proxy_m));
     const double force = glm::length(felt.force_N);
-    // The felt force is only that of the coupling, within the device's limit.
+    // The felt force comes from the coupling alone, and is within the device's limit.
     ASSERT_LE(force, 8.5 * (1.0 + 1e-9));
     ASSERT_LE(glm::length(tests::coupling(felt) - kStiffness * (felt.proxy_m - felt.device_m)),
               1e-6 * kStiffness * kSize);

@@ -85,8 +85,8 @@ TEST_F(SoftNotes, EqualSpacingAndALargeToolAreNotNoted) {
 }
 
 TEST_F(SoftNotes, ASmallToolIsFeltAsOneOfASpacing) {
-  // The felt radius is 1.5 spacings less half a spacing, which is 3 mm. With pixels of 1 mm it is 4.5 - 0.5 *
-  // 1 mm.
+  // The felt radius is 1.5 times the slice distance, less half a pixel. For a spacing of 3 mm it is 4.5 − 1.5
+  // = 3 mm. With pixels of 1 mm it is 4.5 − 0.5 = 4 mm.
   const hybrid::Scene coarse = scene("3", 1.0);
   Touch touch(coarse, {0, 0, 0.05});
   EXPECT_NE(notes_of(touch.built).find("tool of 1 mm radius is felt as one of 3 mm"), std::string::npos)

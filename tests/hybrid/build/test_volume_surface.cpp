@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid surfaces of volume files: that of a range of intensities lies where the scan passes it, and that of
-// labels follows the voxels.
+// Rigid surfaces of volume files. The surface of an intensity range lies where the scan passes an end of the
+// range. A surface of labels follows the voxels.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ const glm::dvec3 kBallMiddle_mm(19.4, 18.7, 19.1);
 
 class VolumeSurface : public tests::SceneFile {
  protected:
-  // A ball whose intensity is 300 at the radius, and rises over a spacing and a half inward.
+  // A ball whose intensity is 300 at the radius, and rises by 200 per mm inward up to 1000.
   void write_ball(double radius_mm) const {
     std::string text = fmt::format(
         "NRRD0004\ntype: int16\ndimension: 3\nspace: left-posterior-superior\nsizes: {0} {0} {0}\n"
@@ -58,12 +58,13 @@ TEST_F(VolumeSurface, OfARangeIsWithinATenthOfASpacing) {
     write_ball(radius_mm);
     EXPECT_LT(rms_off("range = [300, 3000]\n", radius_mm), 0.1) << radius_mm;
     EXPECT_LT(rms_off("range = [300, 3000]\nsmooth = 0\n", radius_mm), 0.1) << radius_mm;
-    // Grown by half a spacing it follows voxels again, and is near the larger ball all the same.
+    // A surface that is grown by half a spacing follows the voxels, not the intensities. It still lies near
+    // the larger ball.
     EXPECT_LT(rms_off("range = [300, 3000]\ngrow = 1\n", radius_mm + 1.0), 0.6) << radius_mm;
   }
 }
 
-// Another threshold gives another surface: 500 is passed one millimeter further in.
+// Another threshold gives another surface: the intensity reaches 500 one millimeter further in.
 TEST_F(VolumeSurface, FollowsTheThreshold) {
   write_ball(14.8);
   EXPECT_LT(rms_off("range = [500, 3000]\n", 13.8), 0.1);

@@ -136,8 +136,8 @@ TEST_F(CompareMeasured, AnyRateAndGaps) {
   EXPECT_NEAR(static_cast<double>(result.in_gaps), 80.0 / 240.0 * 1000.0, 2.0);
   EXPECT_EQ(result.samples + result.in_gaps, 2001U);
   // Position and force are both linear between samples, which are 4 ms apart. The remaining difference comes
-  // from the curvature of the ball and from the beginning of contact. Half the acceleration times the time
-  // squared, with 0.24 m/s^2, is 0.5 um or 0.3 mN.
+  // from the curvature of the ball and from the beginning of contact. The path's own error is smaller: a t²/2
+  // with a = 0.24 m/s² and t = 2 ms is 0.5 um, or 0.3 mN.
   EXPECT_LT(result.rms_N, 5e-3);
   EXPECT_EQ(result.notes.size(), 1U);
   EXPECT_THAT(result.notes[0], testing::HasSubstr("1 gap"));

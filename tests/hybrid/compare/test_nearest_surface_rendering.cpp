@@ -83,8 +83,8 @@ void expect_the_limit_from_either_side(const polygon::RigidSurface& surface, con
     return on(surface, where.position_m + where.rotation * device, where).force_N;
   };
   constexpr double kHeight_m = 1e-8;
-  // The force changes by K times the height, and its direction by the rounding of the height: 1e-16 m of
-  // 1e-8.
+  // The magnitude of the force changes by K times the height. Its direction changes by the relative rounding
+  // of the height, 1e-16 m of 1e-8 m.
   constexpr double kSlack_N = 2.0 * kStiffness * kHeight_m;
   for (const hybrid::Pose& where : {hybrid::Pose{}, pose}) {
     const glm::dvec3 felt = force(0.0, where);
@@ -140,7 +140,7 @@ TEST_F(ProxyOrNot, TheThinPlateThrowsTheToolOutBehindWithoutAProxy) {
     most = std::max(most, classic[n].force_N.z);
     least_proxy = std::min(least_proxy, proxy[n].force_N.z);
     if (n > 0) step = std::max(step, std::fabs(proxy[n].force_N.z - proxy[n - 1].force_N.z));
-    // The proxy's force is that of the whole depth, towards the side from which the tool came.
+    // The proxy's force belongs to the whole depth, and points to the side from which the tool came.
     const double depth = 2e-3 - proxy[n].device_m.z;
     ASSERT_NEAR(proxy[n].force_N.z, kStiffness * std::max(0.0, depth), 1e-6);
     ASSERT_GE(proxy[n].proxy_m.z, 2e-3 - 1e-9);

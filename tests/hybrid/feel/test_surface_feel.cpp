@@ -309,7 +309,7 @@ TEST(Damping, EncoderStepsAreNotFelt) {
       const double felt = rate.add(depth, dt, step);
       if (n > 20) worst = std::max(worst, std::fabs(felt - speed));
     }
-    // One encoder step per tick would be 30 mm/s.
+    // For comparison: one encoder step per tick is 30 mm/s.
     EXPECT_LE(worst, 0.015) << speed;
     EXPECT_TRUE(speed > 0.0 || worst == 0.0);
     std::printf("steps of 0.03 mm at %.0f mm/s: the rate is off by at most %.1f mm/s\n", 1e3 * speed,

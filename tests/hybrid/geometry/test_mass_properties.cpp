@@ -98,7 +98,7 @@ TEST(MassProperties, GoWithThePoseOfTheMesh) {
     const dvec3 position(away, -2.0 * away, 0.5 * away);
     const MassProperties box = hybrid::mass_of_box(size, 1000.0);
     const MassProperties exact{box.mass_kg, position, r * box.inertia_kg_m2 * glm::transpose(r)};
-    // With an offset of kilometers, only the digits are lost that the coordinates have lost.
+    // Far from the origin, the result loses only those digits that the coordinates have lost by rounding.
     expect_same(
         hybrid::mass_of_mesh(placed(polygon::make_box_mesh(0.5 * size, 2), position, rotation), 1000.0),
         exact, 1e-11 + 1e-13 * away);

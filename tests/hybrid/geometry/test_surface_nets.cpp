@@ -111,7 +111,7 @@ TEST(LabelSurface, BallKeepsItsVolumeAndRadiusWhenSmoothed) {
 
 // ---- surface_from_intensities
 
-// A ball as a scan has it: each voxel the mean over the scanner's blur, 1,000 inside and 0 outside.
+// A ball as in a blurred scan: the intensity rises gradually from 0 outside to 1,000 inside.
 struct ScannedBall {
   LabelVolume volume;
   std::vector<float> intensities;
@@ -128,7 +128,7 @@ ScannedBall scanned_ball(double radius, const glm::dvec3& spacing, double noise_
   for (int k = 0; k < n; ++k) {
     for (int j = 0; j < n; ++j) {
       for (int i = 0; i < n; ++i) {
-        // Linear within a spacing of where the intensity is the threshold, which is the surface.
+        // The intensity is linear near the surface. On the surface it is the threshold.
         const double depth = radius - glm::length(glm::dvec3(i, j, k) * spacing - scan.middle);
         const double intensity =
             std::clamp(kThreshold + 500.0 * depth, 0.0, 1000.0) + noise_of * noise_now(random);
@@ -170,7 +170,7 @@ TEST(IntensitySurface, IsWithinATenthOfASpacingOfTheBall) {
   }
 }
 
-// Noise of a tenth of the step between bone and tissue, as in a scan of little dose.
+// The noise is a tenth of the step between bone and tissue, as in a low-dose scan.
 TEST(IntensitySurface, NoiseIsSmoothedAndTheBallStays) {
   const ScannedBall scan = scanned_ball(10.0, glm::dvec3(1.0), 100.0, 3);
   LabelVolume piece = scan.volume;
@@ -181,7 +181,7 @@ TEST(IntensitySurface, NoiseIsSmoothedAndTheBallStays) {
   EXPECT_LT(rms_off_ball(mesh, scan, 10.0), 0.2);
 }
 
-// A range with two ends: a shell between two spheres, whose inner surface is where the upper end is passed.
+// The solid is a shell between two spheres. On the inner sphere the intensity passes the upper end.
 TEST(IntensitySurface, PassesTheEndOfTheRangeThatIsThere) {
   ScannedBall scan = scanned_ball(10.0, glm::dvec3(1.0), 0.0, 1);
   constexpr double kInner = 6.0;
@@ -202,13 +202,14 @@ TEST(IntensitySurface, PassesTheEndOfTheRangeThatIsThere) {
   }
 }
 
-// A mask of two values is passed half way, as its labels are. So it is where intensities tell nothing.
+// The surface of a mask with two values lies half way between voxels, like the surface of its labels. The
+// same holds where the intensities do not pass an end of the range.
 TEST(IntensitySurface, OfAMaskLiesHalfWay) {
   const LabelVolume block = filled(empty_volume(9, 8, 7), [](int i, int j, int k) {
     return i >= 2 && i <= 6 && j >= 3 && j <= 5 && k >= 1 && k <= 4;
   });
   const std::vector<float> mask(block.labels.begin(), block.labels.end());
-  const std::vector<float> nothing(block.labels.size(), 7.0F);  // all of it within the range
+  const std::vector<float> nothing(block.labels.size(), 7.0F);  // all intensities are within the range
   for (const hybrid::IntensityRange& range :
        {hybrid::IntensityRange{mask, 0.5, 255.5}, hybrid::IntensityRange{nothing, 5.0, 9.0}}) {
     const TriangleMesh mesh = hybrid::surface_from_intensities(block, range, 0);
@@ -361,8 +362,6 @@ TEST(KeepLargestPiece, KeepsLabelsAndNeedsNoMaterial) {
   hybrid::keep_largest_piece(none, true);
 }
 
-// ---- grow_labels
-
 TEST(GrowLabels, AgreesWithBruteForceOnAnyLattice) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -427,8 +426,6 @@ TEST(GrowLabels, RefusesWhatCannotBe) {
   EXPECT_NE(refusal([&] { hybrid::grow_labels(one, 1e300); }), "");
   EXPECT_EQ(count(hybrid::grow_labels(empty_volume(3, 3, 3), 1e300)), 0U);
 }
-
-// ---- time
 
 TEST(LabelSurface, SevenMillionVoxelsTakeAboutASecond) {
   const LabelVolume volume = ball(192, 90.0, glm::dvec3(1.0));

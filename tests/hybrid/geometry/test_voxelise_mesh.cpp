@@ -76,8 +76,9 @@ TEST(VoxeliseMesh, SurfaceOfLabelsGivesTheLabelsBack) {
     LabelVolume volume = noise(8, 7, 6, 0.3, seed);
     volume.spacing_m = {1e-3, 2e-3, 0.5e-3};
     const TriangleMesh mesh = hybrid::surface_from_labels(volume, 0);
-    // The lattice is centred on the mesh, and the mesh's box has a whole number of voxels, so the centres
-    // coincide. In cells that two sheets share a vertex is moved, but not near to a centre.
+    // The lattice is centred on the mesh, and the mesh's box has a whole number of voxels. So the voxel
+    // centres coincide with those of `volume`. In a cell that two sheets share, a vertex is moved, but not
+    // close to a voxel centre.
     const LabelVolume back = hybrid::voxelise_mesh(mesh, volume.spacing_m, 1, 1'000'000);
     EXPECT_EQ(count(back), count(volume)) << seed;
   }

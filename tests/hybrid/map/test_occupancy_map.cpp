@@ -248,8 +248,8 @@ TEST(OccupancyMap, ManyObjectsShareTheLastBit) {
   }
 }
 
-// The rule is equal along each axis, for values on both sides of a cell's face and of zero, and for values
-// without a cell.
+// Tests each axis with coordinates on both sides of a cell's face and of zero, and with coordinates that have
+// no cell.
 TEST(OccupancyMap, ACellBeginsAtItsLowerFace) {
   const hybrid::BrickGrid grid(0.5, dvec3(0.0));
   const double far = 1e300, none = std::numeric_limits<double>::quiet_NaN();

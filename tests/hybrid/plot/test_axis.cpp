@@ -81,7 +81,7 @@ TEST(AxisTest, HasPowersOfTenOnALogarithmicScale) {
   EXPECT_FALSE(std::isfinite(axis.page(0.0)));
   EXPECT_FALSE(std::isfinite(axis.page(-1.0)));
   EXPECT_EQ(axis.ticks(6).size(), 7U);
-  // An axis of a single decade has ticks in between.
+  // An axis of a single decade has ticks between the powers of ten.
   EXPECT_EQ(Axis(Scale::logarithmic, {1.0, 10.0}, 0.0, 1.0).ticks(5),
             (std::vector<double>{1.0, 2.0, 5.0, 10.0}));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Small files of every kind that the program reads, but for meshes, volumes and paths, which have fuzzers of
+// Small files of every kind that the program reads, except meshes, volumes and paths. These have fuzzers of
 // their own.
 #include <png.h>
 
@@ -24,8 +24,8 @@ std::string bytes_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-// A recording of a few ticks, with an edit or without. Its scene has to stay where it is, because a replay
-// reads it again.
+// A recording of a few ticks, with an edit or without. The scene file has to stay in its place, because a
+// replay reads the file again.
 std::string recording(const char* scene_name, bool edited) {
   const fs::path scene_file = scenes_folder / scene_name;
   const hybrid::Scene scene = hybrid::load_scene(scene_file);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the fuzzer of readers does with every file, by its extension: scenes, recordings (loaded, written
-// again and replayed), names of labels, reports of `bench`, scripts of a window, images of reliefs.
+// The fuzzer of readers reads each file by its extension: scenes, recordings (loaded, written again and
+// replayed), names of labels, reports of `bench`, scripts of a window, images of reliefs.
 #include <zlib.h>
 
 #include <array>
@@ -38,8 +38,8 @@ std::string bytes_of_file(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-// A value that is written into a scene's text is there when the text is read again, and nothing else changes
-// it.
+// Reads a scene, writes a value into its text, and reads the text again. The value must be in it, and the
+// number of objects must be the same.
 std::size_t read_a_scene(const fs::path& file) {
   const hybrid::Scene scene = hybrid::read_scene(file);
   require(std::isfinite(scene.rate_hz) && scene.rate_hz > 0.0, "a scene has a rate");
@@ -116,7 +116,8 @@ std::size_t read_a_script(const fs::path& file) {
   return script.size();
 }
 
-// Chunks get the checksums of what is in them, because a reader looks no further at others.
+// Gives each chunk of a PNG the checksum of its content. A reader refuses a chunk with a wrong checksum
+// without reading its content.
 void mend_checksums(const fs::path& file) {
   std::string png = bytes_of_file(file);
   std::size_t at = 8;  // behind the signature
@@ -166,10 +167,10 @@ FuzzOutcome fuzz_file(const fs::path& file) {
       outcome.loaded = true;
       outcome.size += size;
       outcome.signature += "ok" + std::to_string(std::min<std::size_t>(size, 40));
-    } catch (const std::runtime_error& refusal) {  // also SceneError and ComposeError
+    } catch (const std::runtime_error& refusal) {  // includes SceneError and ComposeError
       add_letters(outcome.signature, refusal.what());
       require(outcome.signature.size() > 4, "a refusal has words");
-    } catch (const std::invalid_argument& refusal) {  // of reports
+    } catch (const std::invalid_argument& refusal) {  // from a report of `bench`
       add_letters(outcome.signature, refusal.what());
     }
   }

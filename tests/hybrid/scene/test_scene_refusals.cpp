@@ -37,7 +37,8 @@ struct Broken {
   const char* wrong;   // part of the error's text
   const char* remedy;  // part of the remedy's text
 };
-// Without this, a case would be listed by the bytes of its pointers, which differ between runs.
+// Names a case by its file. By default GoogleTest prints a case's bytes, and the pointers in it differ
+// between runs.
 void PrintTo(const Broken& scene, std::ostream* out) {
   *out << scene.file;
 }
@@ -404,7 +405,7 @@ TEST_F(SceneRefusal, Latin1IsNamedWithItsLine) {
   EXPECT_NE(said.find("Latin-1"), std::string::npos) << said;
   EXPECT_NE(said.find("'\u00E4'"), std::string::npos) << said;
   EXPECT_NE(said.find("save the file as UTF-8"), std::string::npos) << said;
-  // The same holds in a comment. A text that is cut within a character is neither Latin-1 nor UTF-8.
+  // Latin-1 is also found in a comment. A text that is cut within a character is neither Latin-1 nor UTF-8.
   EXPECT_NE(refusal("format = 1 # f\xFCr\n").find(":1:15: "), std::string::npos);
   EXPECT_NE(refusal("format = 1 # \xE2\x82\n").find("not utf-8"), std::string::npos);
   EXPECT_EQ(refusal("format = 1\ntitle = \"Sch\u00E4del\"\n" + block + path), "");

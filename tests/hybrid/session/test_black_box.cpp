@@ -159,8 +159,8 @@ TEST_F(BlackBox, ACrashWritesIt) {
   EXPECT_EQ(kept().position_m.front().x, 50.0);
 }
 
-// Actions on a crash run in reverse order of their creation, so motors come first. A crash within one action
-// does not stop the others.
+// On a crash, the newest OnCrash object acts first. So the motors are switched off before the black box is
+// written. A crash within one action does not stop the others.
 TEST_F(BlackBox, ActsOnACrashGoBackwardsAndOneThatCrashesLeavesTheOthers) {
   EXPECT_EXIT(
       {

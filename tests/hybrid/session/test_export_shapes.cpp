@@ -159,8 +159,9 @@ TEST_F(SavedShapes, ThinnedObjectsKeepLabelsAnchorsAndMaterials) {
       kBone + "anchors = { labels = [2] }\nthinning = { above = 1e5, every = 4, shell = 1 }\n" + tests::path);
   const hybrid::BuiltScene built = hybrid::build_scene(scene, {});
   const voxel::Lattice& lattice = built.state->soft[0]->lattice();
-  // Inside the shell, the bone has voxels 6 to 33 on each axis. Struts remain where two coordinates are on
-  // the frame. In the outermost layers of the inside, one other coordinate on the frame is enough.
+  // Inside the shell, the bone has voxels 6 to 33 on each axis. A voxel remains as a strut if two of its
+  // coordinates are multiples of 4. In the outermost layers of the inside (coordinate 6 or 33), one other
+  // coordinate is enough.
   const std::size_t inside = 28;
   std::size_t frame = 0;
   for (int k = 6; k <= 33; ++k) {

@@ -49,7 +49,8 @@ double slow_run_jnd(const std::vector<hybrid::TraceRow>& fast, const std::vector
   for (std::size_t n = 0; n < fast.size(); ++n) {
     if (!(fast[n].soft_N > 1e-6)) continue;
     const double s = of_fast[n] * of_slow.back() / of_fast.back();
-    // At a stop the last tick counts, in which the slow run is at rest.
+    // At a stop, many ticks of the slow run have this position. The last of them is taken, because the slow
+    // run is then at rest.
     const auto at = std::upper_bound(of_slow.begin(), of_slow.end(), s + 1e-9) - of_slow.begin() - 1;
     const auto reference = slow[static_cast<std::size_t>(at)].force_N;
     worst = std::max(worst, hybrid::jnd_of(fast[n].force_N, reference, floor_N));

@@ -106,8 +106,8 @@ TEST_F(GridSession, TheWindowShowsTheDent) {
   for (const glm::vec3& moved : shown()) ASSERT_EQ(moved, glm::vec3(0.0F));
 }
 
-// If the chain is tight over nearly the whole object, the force must be that at rest. Relaxation of single
-// links stalls in this case. Objects that fit into one patch and larger ones are tested. Then the tool is
+// If the chain is tight over nearly the whole object, the force must equal the force at rest. Relaxation of
+// single links stalls in this case. Tests objects that fit into one patch, and larger ones. Then the tool is
 // held still, and the force must stay the same from tick to tick.
 TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
   for (const int edge : {24, 38, 58}) {
@@ -145,8 +145,8 @@ std::string layers(const std::array<int, 3>& young, const char* play) {
   return text;
 }
 
-// Skin, fat and muscle with a tight chain. The fat between the others is squeezed to its limits. The force
-// must be that at rest, also while the tool moves.
+// Skin, fat and muscle with a tight chain. The fat between skin and muscle is squeezed to its limits. The
+// force must equal the force at rest, also while the tool moves.
 TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
   constexpr std::array alike{20000, 5000, 10000}, real{100000, 3250, 11100};  // (Pa)
   for (const auto& [young, play] : {std::pair{alike, "[0.9, 1.1]\nshear = 0.1"},
@@ -173,7 +173,7 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
 }
 
 // A ball with a radius of nine spacings is pressed five spacings deep at 0.1 m/s, with no active limit. The
-// force must be that at rest.
+// force must equal the force at rest.
 TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   std::string text = block("spacing = 1\n");
   const auto put = [&](const std::string& what, const std::string& with) {
@@ -190,8 +190,8 @@ TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // 0.35 of the least just noticeable difference
 }
 
-// A ball with a radius of 2.5 spacings, up to four spacings deep. With wide and with active limits, its force
-// must be that of the same links relaxed one by one. It must not oscillate.
+// A ball with a radius of 2.5 spacings is pressed up to four spacings deep, with wide limits and with active
+// limits. Its force must be that of the same links relaxed one by one, and must not oscillate.
 TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
   // Near a body that may move, an object is relaxed link by link.
   const std::string body =
@@ -202,8 +202,8 @@ TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
     const char* limits;
     double tolerance, still;  // relative to the force
   };
-  // At limits, the links' force on a voxel is not known. So the voxel swings sideways by a fiftieth of a
-  // spacing.
+  // If links are at their limits, their force on a voxel is not known. So the voxel swings sideways by a
+  // fiftieth of a spacing, and the second row has wider tolerances.
   for (const auto& [limits, tolerance, still] :
        {Row{"[0.01, 2.5]\nshear = 2", 0.01, 1e-3}, Row{"[0.5, 1.5]\nshear = 0.5", 0.025, 0.01}}) {
     std::string text = block("spacing = 2\n");
@@ -237,7 +237,7 @@ TEST_F(GridSession, ASmallBallFeelsWhatLinksDoAndHoldsStill) {
 }
 
 // Distant tissue must follow at once, inwards and outwards. A step of a tenth of a spacing changes the force
-// by an eighth. One tick later the force must be that at rest.
+// by an eighth. One tick later the force must equal the force at rest.
 TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   const hybrid::Scene scene = load(block("spacing = 1\n"));
   for (const double step_m : {-1e-4, 1e-4}) {
@@ -252,8 +252,9 @@ TEST_F(GridSession, ATickAfterAStepTheForceIsThatAtRest) {
   }
 }
 
-// On closed paths, slow or fast, frictionless tissue gives the hand no energy. The paths are down and up,
-// then down, aside, up and back, and the latter in reverse. Aside, the tissue is 1 % softer.
+// On closed paths, slow or fast, frictionless tissue gives the hand no energy. The first path is down and up.
+// The second is down, aside, up and back. The third is the second in reverse. At the place aside, the tissue
+// is 1 % softer.
 TEST_F(GridSession, AClosedPathGivesTheHandNoEnergy) {
   const glm::dvec3 above(0.0, 0.0, 0.043), deep(0.0, 0.0, 0.037), aside(0.005, 0.0, 0.0);
   const std::vector<std::vector<glm::dvec3>> paths{
@@ -331,9 +332,9 @@ double overlap(tests::Touch& touch) {
   return most;
 }
 
-// The tool presses tissue onto a bone. While it moves, the force is that at rest. Hand, bone and anchors
-// balance. The bone is outside the finest patch, so voxels between coarse nodes may overlap it by a fiftieth
-// of a spacing.
+// The tool presses tissue onto a bone. While the tool moves, the force equals the force at rest. The forces
+// of hand, bone and anchors balance. The bone is outside the finest patch, so voxels between coarse nodes may
+// overlap it by a fiftieth of a spacing.
 TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
   for (const double turned_deg : {0.0, 180.0}) {
     const hybrid::Scene scene = load(slab_on_bone(turned_deg));
@@ -365,7 +366,7 @@ TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
   }
 }
 
-// After a contact, tissue is at rest at once, and its obstacles are those at rest.
+// After a contact, tissue is at rest at once, and has the same obstacles as before the contact.
 TEST_F(GridSession, ObstaclesAreThoseOfRestAfterAContact) {
   tests::Touch touch(load(slab_on_bone(0.0)), {0.0, 0.0, 0.019}, true);
   const auto obstacles = touch.state().soft[0]->obstacles();

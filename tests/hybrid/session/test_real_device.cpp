@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sessions on a real device, which the test double of its driver's library simulates.
+// Sessions on a PHANToM. A test double of the driver's library stands in for the device.
 #include "hybrid/session/real_device.h"
 
 #include <gmock/gmock.h>

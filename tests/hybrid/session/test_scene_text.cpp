@@ -75,7 +75,7 @@ TEST_F(SceneText, AKeyThatTheSceneLacksIsAdded) {
   EXPECT_EQ(edited.left.size(), 0U);
 }
 
-// The text stays unchanged, and the reason is reported.
+// A value that has no place of its own in the text is not written, and the reason is reported.
 TEST_F(SceneText, WhatHasNoPlaceIsLeft) {
   const std::string text =
       "format = 1\ntool = { radius = 2 }\nrigid = [{ name = \"a\", primitive = \"ball\", radius = 4, "

@@ -64,7 +64,7 @@ TEST(MeasuredStability, IsThatOfTheEigenvalues) {
   expect_stable_as_eigenvalues_say(firm, "a firm grip, two ticks");
 }
 
-// Not only the sign of the growth rate, but also its value is that of the largest eigenvalue.
+// The value of the growth rate, not only its sign, is that of the largest eigenvalue.
 TEST(MeasuredStability, TheEnvelopeGrowsByTheSpectralRadius) {
   const LoopSetting setting = bare(1.0);
   for (const double stiffness : {1960.0, 1995.0, 2010.0, 2050.0}) {
@@ -76,7 +76,8 @@ TEST(MeasuredStability, TheEnvelopeGrowsByTheSpectralRadius) {
 
 // ---- passivity ------------------------------------------------------------------------------------------
 
-// At every frequency, the measured damping that absorbs the energy from the wall equals that of the formula.
+// At every frequency, the measured damping that absorbs the energy from the wall equals the damping of the
+// formula.
 TEST(MeasuredPassivity, EveryFrequencyNeedsTheDampingOfTheFormula) {
   constexpr double kStiffness = 1500.0;
   for (const LoopSetting& setting : {bare(1.0), bare(1.0, 1), bare(1.0, 2, 0.8), bare(1.0, 0, 2.0, 4000.0)}) {
@@ -104,8 +105,8 @@ TEST(MeasuredPassivity, IsThatOfColgateAndSchenkel) {
   }
 }
 
-// With its account, the tick suspends damping that would return energy. So a damped wall is as passive as one
-// without damping.
+// With the account of damping work, the tick suspends damping that would return energy. So a damped wall is
+// as passive as one without damping.
 TEST(MeasuredPassivity, TheAccountOfDampingTakesItsPartAway) {
   for (const bool account : {false, true}) {
     LoopSetting setting = bare(4.0, 0, 3.5);

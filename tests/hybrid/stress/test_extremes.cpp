@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A part of the suite of extremes, and some fuzzed ticks. The program runs all of both: `hybrid stability
-// SCENE --extremes --fuzz-ticks 1000000`. Here HYBRID_FUZZ_TICKS sets the number of ticks.
+// A part of the suite of extremes, and some fuzzed ticks. `hybrid stability SCENE --extremes --fuzz-ticks
+// 1000000` runs the whole suite and a million ticks. Here HYBRID_FUZZ_TICKS sets the number of ticks.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

@@ -239,11 +239,11 @@ TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
             });
           }
         }
-        // When the tool moves around an edge of bone, the force turns between two ticks. Then the error of
-        // the trapezoidal rule is proportional to the square of the step: 2.49, 0.65 and 0.13 uJ at 0.25,
-        // 0.125 and 0.0625 m/s around the tissue's edge. Simpson's rule is no better (2.87 uJ), because the
-        // force has kinks there. So Richardson extrapolation removes the error at the highest speed. The work
-        // of tissue depends on the speed, and counts without correction.
+        // Richardson extrapolation removes the error of the trapezoidal rule at the highest speed. Around an
+        // edge of bone, the force turns between two ticks, and the error is proportional to the square of the
+        // step. Around the tissue's edge it is 2.49, 0.65 and 0.13 uJ at 0.25, 0.125 and 0.0625 m/s.
+        // Simpson's rule is no better (2.87 uJ), because the force has kinks there. The work of tissue is not
+        // corrected, because it depends on the speed.
         const double rigid_J = speed == 0.25 ? (4.0 * slower.rigid_J - work.rigid_J) / 3.0 : work.rigid_J;
         std::printf(
             "%s, loop of %zu corners at %g m/s %s: tissue %.3f uJ, rigid %.3f (%.3f by ticks); at most %.2f "
@@ -325,8 +325,8 @@ Scenario of_bricks(Scenario scenario) {
   scenario.asynchronous = scenario.bricks = true;
   if (std::string_view(scenario.name) == "TissueOnTissue") {
     // If links of both objects are at their limits, the force varies from tick to tick. The test below covers
-    // z = 7 mm. At z = 6 mm the error is 2.5 % on average and 4 % in single ticks, at z = 5 mm 1.6 % and 29
-    // %.
+    // z = 7 mm. At z = 6 mm the error is 2.5 % on average and 4 % in single ticks. At z = 5 mm it is 1.6 % on
+    // average and 29 % in single ticks.
     scenario.holds_mm.resize(1);
   }
   return scenario;

@@ -53,8 +53,8 @@ TEST(ClosedPaths, GiveNoEnergy) {
   std::printf("closed paths: %.3g to %.3g uJ given to the hand\n", 1e6 * least, 1e6 * most);
 }
 
-// In slow strokes, the force's steps exceed those of the equilibrium by at most a tenth of a JND. Faster
-// strokes exceed this at their turning points, but by at most 1 JND.
+// In slow strokes, the steps of the force exceed the steps of the equilibrium by at most a tenth of a JND.
+// Faster strokes exceed them by more at their turning points, but by at most 1 JND.
 TEST(Continuity, StepsAreThoseOfTheEquilibrium) {
   const StrokeCase slow{.radius_spacings = 2.0, .depth_spacings = 1.0, .speed_m_per_s = 0.01};
   const StrokeCase slide{

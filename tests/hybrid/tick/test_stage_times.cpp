@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The times of a tick. The stages add up to the tick, and neither counts time in which the thread did not
-// run.
+// The times of a tick. The times of the stages add up to the time of the tick. They do not count time in
+// which the thread did not run.
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <sched.h>

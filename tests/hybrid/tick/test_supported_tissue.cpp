@@ -228,8 +228,8 @@ void expect_balance(double depth_m, double share) {
 TEST_F(Arbitration, TwoSoftObjectsBalanceWhatTheToolPresses) {
   for (const double depth : {2.5e-3, 4e-3}) expect_balance(depth, 0.02);
 }
-// The chain under the tool is tight down to voxels that the other object supports. The sum lacks the forces
-// of these tight links, which are 3 %.
+// The chain under the tool is tight down to voxels that the other object supports. The sum of forces lacks
+// the limit forces of these links, which are 3 % of the force.
 TEST_F(Arbitration, TwoSoftObjectsNearlyBalanceWhereTheChainIsTight) {
   expect_balance(8e-3, 0.05);
 }

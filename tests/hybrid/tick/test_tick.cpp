@@ -30,8 +30,8 @@ const std::string tool_of_5 = "format = 1\n[tool]\nradius = 5\nstiffness = 1000\
 
 struct Border {
   std::string name;
-  std::string rigid, soft;  // their tables
-  double tool_z_mm;         // of the loop: 2 mm in the higher object
+  std::string rigid, soft;  // scene text of both objects
+  double tool_z_mm;         // height of the tool's centre where the loop presses
   double dwell_x_mm = 8.0;  // extent of the loop on either side of the border at x = 0
 };
 
@@ -53,15 +53,15 @@ std::string tissue(double from_x_mm, double to_x_mm) {
 
 class Energy : public tests::SceneFile, public ::testing::WithParamInterface<Border> {};
 
-// The tool presses, crosses the border, moves sideways, crosses back, returns sideways and lifts. It ends
-// where it began, and so does everything that it touched; any energy that the hand has gained then is an
+// The tool presses, crosses the border, moves sideways, crosses back, returns sideways and lifts. At the end,
+// the tool and everything that it touched are where they began. So any energy that the hand has gained is an
 // error.
 TEST_P(Energy, AClosedLoopOverTheBorderGivesTheHandNothing) {
   const Border& border = GetParam();
   Touch touch(load(tool_of_5 + border.rigid + border.soft + tests::some_path),
               {-border.dwell_x_mm * 1e-3, -2e-3, 0.015});
   const double z = border.tool_z_mm, x = border.dwell_x_mm;
-  // In both directions.
+  // Runs the loop in both directions.
   for (const double way : {1.0, -1.0}) {
     const std::array<dvec3, 7> loop{{{-x, -2 * way, 15},
                                      {-x, -2 * way, z},
@@ -158,7 +158,7 @@ TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsNoWedge) {
       "[material.gel]\nyoung = 8000\nstretch = [0.99, 1.01]\nshear = 0.6\n[[soft]]\nname = \"block\"\n"
       "formula = \"block\"\nsize = [40, 40, 20]\nspacing = 2\nposition = [0, 0, 0]\nmaterial = \"gel\"\n" +
       tests::some_path;
-  // Over a voxel, beside a voxel, and between two.
+  // The tool is over a voxel, beside a voxel, or between two voxels.
   for (const double x_mm : {11.0, 10.6, 10.0}) {
     const dvec3 above(1e-3 * x_mm, 1e-3, 0.0135), below = above - dvec3(0, 0, 3e-3);
     Touch touch(load(rows), above);
@@ -175,7 +175,7 @@ TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsNoWedge) {
     std::printf("x = %.1f mm: %.3f N, %.4f N of it aside, at most %.3f N; %.4f mJ given there and back\n",
                 x_mm, glm::length(coupling(pressed)), aside, most, 1e3 * work);
     EXPECT_GT(most, 1.5);
-    if (x_mm != 10.6) {  // from beside a voxel it slides off, which is right
+    if (x_mm != 10.6) {  // a tool beside a voxel slides off, which is right
       EXPECT_LE(aside, 0.01 * most);
     }
     EXPECT_LE(most, 3.0);  // the coupling's force, at most 3 mm from the device
@@ -183,8 +183,8 @@ TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsNoWedge) {
   }
 }
 
-// The same beside a surface of many small triangles, more than a tick examines near the tool: the tool must
-// stop as beside the same surface made of two triangles.
+// The tool presses on almost rigid rows of voxels beside a wall of many small triangles, more than a tick
+// examines near the tool. It must stop as it does beside the same wall made of two triangles.
 TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsStoppedBesideAFineMeshAsBesideACoarseOne) {
   std::array<TickResult, 2> pressed;
   for (std::size_t fine = 0; fine < 2; ++fine) {
@@ -208,15 +208,16 @@ TEST_F(Tick, AToolOnRowsThatStandOnAnchorsIsStoppedBesideAFineMeshAsBesideACoars
             0.01 * glm::length(coupling(pressed[0])));
 }
 
-// A punch has no sides. If it is dragged sideways against such rows, some voxels are suddenly far above its
-// face and cannot give way. They must stop the punch without lifting it, because lifting would create energy.
+// A punch has no sides. If it is dragged sideways against almost rigid rows of voxels, some voxels are
+// suddenly far above its face and cannot give way. They must stop the punch without lifting it, because
+// lifting would create energy.
 TEST_F(Tick, APunchDrawnAgainstRowsThatStandOnAnchorsIsStoppedAndNotLifted) {
   const std::string rows =
       "format = 1\n[tool]\nshape = \"punch\"\nradius = 6\nstiffness = 1000\n" + tests::unlimited +
       "[material.gel]\nyoung = 4000\nstretch = [0.99, 1.01]\nshear = 0.6\n[[soft]]\nname = \"block\"\n"
       "formula = \"block\"\nsize = [40, 40, 20]\nspacing = 2\nposition = [0, 0, 0]\nmaterial = \"gel\"\n" +
       tests::some_path;
-  constexpr double edge_m = 0.019;  // of the centres of the outermost voxels
+  constexpr double edge_m = 0.019;  // x of the centres of the outermost voxels
   for (const double depth_mm : {1.0, 3.0, 6.0}) {
     const double z = 0.01 - 1e-3 * depth_mm;
     Touch touch(load(rows), {0.06, 0, z});

@@ -65,8 +65,8 @@ TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
   EXPECT_GT(itself.still.ticks, 50U);
   EXPECT_EQ(itself.moving.max_jnd, 0.0);
   EXPECT_EQ(itself.still.max_jnd, 0.0);
-  // Slowed down by a factor of 1, the truth is the session itself, because so small a block has no patches to
-  // widen.
+  // With a slow-down factor of 1, the truth is the session itself. The block is too small for patches, which
+  // a slow run would widen.
   EXPECT_EQ(error(slow(1), hybrid::play_setting(scene, kBlock, motion, {}).course).worst_jnd(), 0.0);
 }
 
@@ -184,7 +184,7 @@ TEST_F(Tune, SettingsBesideOneChangeOneObject) {
   ASSERT_EQ(objects.size(), 2U);
   const auto own = hybrid::own_setting(objects);
   const auto beside = hybrid::settings_beside(objects, own);
-  EXPECT_EQ(beside.size(), 8U);  // of each object: coarser, finer, the other energy, rigid
+  EXPECT_EQ(beside.size(), 8U);  // for each object: coarser, finer, the other energy, rigid
   for (const auto& setting : beside)
     EXPECT_EQ((setting.objects[0] == own.objects[0]) + (setting.objects[1] == own.objects[1]), 1);
   for (const auto& setting : hybrid::common_settings(objects, false))

@@ -57,8 +57,8 @@ TEST_F(Edits, BeforeTheFirstTickTheyGiveTheScenesThatSayTheSame) {
   EXPECT_NE(in_scene.state_hash, plain);
 }
 
-// Twice Young's modulus and twice the stiffness of the coupling: the tool moves as before, and the force
-// doubles, as the lattice is linear.
+// Young's modulus and the stiffness of the coupling are doubled. The tool then moves as before, and the force
+// doubles, because the lattice is linear.
 TEST_F(Edits, StifferTissueAndCouplingGiveForcesInProportion) {
   const hybrid::SessionResult one = felt(scene("stiffness = 300\n", ""));
   const hybrid::SessionResult two =
@@ -100,8 +100,8 @@ TEST_F(Edits, AreRefusedOutOfTheScenesRange) {
   EXPECT_EQ(hybrid::edited_value(*built.world, *built.state, 0, static_friction), 0.3);
 }
 
-// Young's modulus of such tissue cannot be edited, because forces on other bodies would have to change too,
-// not only that on the tool.
+// Young's modulus of tissue that meets free bodies or other tissue cannot be edited. Not only the force on
+// the tool would have to change, but also the forces on these objects.
 TEST_F(Edits, TissueThatMeetsFreeBodiesOrTissueKeepsItsStiffness) {
   const std::string free =
       "[[rigid]]\nname = \"weight\"\nprimitive = \"ball\"\nradius = 4\nposition = [0, 0, "

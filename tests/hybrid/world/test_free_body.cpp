@@ -233,8 +233,8 @@ TEST(FreeBody, StiffContactsAtCornersNeverMakeALightBodyFly) {
   }
 }
 
-// On a springy contact, under gravity, it comes to rest at the depth where both forces balance, for any time
-// step.
+// A body on a springy contact comes to rest at the depth where the contact force and gravity balance, for any
+// time step.
 TEST(FreeBody, RestsWhereForcesBalance) {
   for (const double dt : {1e-4, 1e-3, 1e-2}) {
     const FreeBody body = [] {

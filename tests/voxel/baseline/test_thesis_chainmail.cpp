@@ -84,8 +84,8 @@ TEST(Classic, AnchoredElementsStayAndResetGoesToRest) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(object.displacement(object.at(4, 4, k)), glm::vec3(0.0F));
 }
 
-// In a homogeneous block, the forces of all links on a line from an element add up to one spring constant
-// times the relative displacement of the line's ends.
+// In a homogeneous block, consider all links on a line that starts at an element. The sum of their forces is
+// one spring constant times the relative displacement of the line's ends.
 TEST(Classic, ForceOfTheLinesIsTheirSpringsTimesTheDisplacement) {
   const double h = 1e-3, E = 1e4, nu = 0.3;
   ThesisChainMail object(tests::block({21, 21, 11}, glm::dvec3(h)), of_slack(0.3));

@@ -23,8 +23,9 @@ using namespace tests;
 using voxel::LatticeOptions;
 using voxel::RowId;
 
-// Blocks and lenses of one material, wider than a row, are pushed at their surface. They move in cones of
-// closed form, which faces and anchors cut. Some bodies are not boxes.
+// Bodies of one material, most of them wider than a row, are pushed at their surface. The voxels move in
+// cones of closed form, which end at faces and anchors. The bodies are blocks, blocks with a slit, and
+// lenses.
 TEST(ChainMail, ConesAreTheClampToo) {
   Random random(15);
   double worst = 0.0;
@@ -157,7 +158,7 @@ TEST(ChainMail, WhatIsBeyondABudgetWaitsAndIsFinished) {
   Random random(17);
   std::size_t partial = 0, stopped = 0, calls = 0, sweeping_calls = 0;
   for (int n = 0; n < scenes(40); ++n) {
-    // The budget is too small for a sweep, or large enough for a sweep to begin.
+    // In most scenes the budget is too small for a sweep. In every fourth scene a sweep can begin.
     const bool sweeps = n % 4 == 3;
     const std::uint64_t budget = sweeps ? 1540 : 100;
     const int least = sweeps ? 24 : 10;

@@ -137,7 +137,7 @@ Difference compare(const Body& body, const PressedSquare& patch, int half_width)
   return most;
 }
 
-// If level 0 covers the object, the result is that of the lattice, whatever its dimensions.
+// If level 0 covers the object, the result is the lattice's equilibrium, whatever the object's dimensions.
 TEST(CompositeGrid, AllVoxelsAreTheLatticeAtEquilibrium) {
   for (const Index3& dims : {Index3{13, 13, 11}, Index3{12, 15, 10}, Index3{9, 16, 14}}) {
     for (const double depth : {0.3, 1.0}) {
@@ -190,7 +190,7 @@ TEST(CompositeGrid, SheetsOfSingleVoxelsAreInTheLinks) {
 }
 
 // Layers and lumps of tissues whose stiffnesses differ by factors of 4 to 200. Soft layers between stiff ones
-// are compressed to their limits. The depth is a fraction of the depth at which the chain ends.
+// reach their limits. The depth is a fraction of that at which all links below the square do so.
 int stiff_soft_stiff(const Index3& p) {
   return p[2] < 4 || p[2] >= 9 ? 4 : 1;
 }
@@ -295,8 +295,7 @@ TEST(CompositeGrid, PatchesInTissuesThatDifferMuch) {
   }
 }
 
-// Stiffness of cubes of cells of any size. Layers act in series across the layers, and in parallel along
-// them.
+// Stiffness of cubes of 1 to 32 cells per edge: layers act in series across them, and in parallel along them.
 TEST(CompositeGrid, CubesAreAsStiffAsTheirLayers) {
   const int n = 33;
   const auto layers = [](const Index3& p) { return p[2] <= 16 ? 1 : 4; };

@@ -47,8 +47,8 @@ TEST(ObjectOnGrid, FeelsTheLatticeAtEquilibriumThatAnchorsCarry) {
   }
 }
 
-// The tool moves by half a spacing per tick, inwards and outwards. The force is that of the tool's present
-// place.
+// The tool moves by half a spacing per tick, inwards and outwards. The force must match the tool's present
+// place, not an earlier one.
 TEST(ObjectOnGrid, AMovingToolFeelsTheForceOfWhereItIs) {
   Pressed pressed;
   ASSERT_TRUE(pressed.on_grid);

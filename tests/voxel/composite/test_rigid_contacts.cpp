@@ -200,9 +200,9 @@ Felt on_patches(const Slab& slab, int half_width) {
   return felt;
 }
 
-// With all voxels on level 0, the result is that of the lattice. The grid meets an oblique plane on one axis
-// and applies its load on the others. The reference projects along the plane's normal. Both must give the
-// same result.
+// With all voxels on level 0, the result is the lattice's equilibrium. The grid meets an oblique plane on one
+// axis, and applies the plane's load on the other axes. The reference projects along the plane's normal. Both
+// must give the same result.
 TEST(RigidContacts, AllVoxelsAreTheLatticeAtEquilibrium) {
   std::mt19937 random(1);
   for (int scene = 0; scene < 40; ++scene) {
@@ -218,8 +218,8 @@ TEST(RigidContacts, AllVoxelsAreTheLatticeAtEquilibrium) {
   }
 }
 
-// With nested patches, coarse nodes may represent the contact. The tolerance is that of patches of this width
-// without rigid surfaces.
+// With nested patches, coarse nodes may represent the contact. The tolerance is the same as for patches of
+// this width without rigid surfaces.
 TEST(RigidContacts, PatchesComeNearTheLattice) {
   constexpr int kHalfWidth = 8;
   std::mt19937 random(2);

@@ -339,8 +339,8 @@ TEST(BrickLoads, LeavesNothingBehind) {
   EXPECT_LT(most, 1e-3 * 1.5e-3);
 }
 
-// A force in units of Young's modulus times the spacing squared is the same number for spacings from 1 µm to
-// 10 m and moduli from 1 Pa to 1 TPa.
+// The force divided by Young's modulus and the spacing squared is a constant, for spacings from 1 µm to 10 m
+// and moduli from 1 Pa to 1 TPa.
 TEST(BrickLoads, UnitsDoNotMatter) {
   double expected = 0.0;
   for (const double h : {1e-3, 1e-6, 10.0}) {

@@ -38,9 +38,9 @@ std::vector<Orientation> orientations() {
 }
 
 // Contact modulus of a half-space with normal n under the six-link energy. Each displacement component is a
-// scalar field whose stiffness tensor is 1 along its own axis and `across` along the others. A surface wave
-// along q meets the stiffness √(nn·qq − nq²) per wavenumber. The traction along n loads each component by
-// n[axis]. The compliance is the mean over all directions q, as in a round contact.
+// scalar field. Its stiffness tensor T is 1 along its own axis and `across` along the others. A surface wave
+// along q meets the stiffness √(nTn·qTq − (nTq)²) per wavenumber. The traction along n loads each component
+// by n[axis]. The compliance is the mean over all directions q, as in a round contact.
 double six_link_face(const Eigen::Matrix3d& block, double across) {
   const Eigen::Vector3d n = block.row(2);
   double sum = 0.0;

@@ -85,8 +85,8 @@ LabelVolume wide_volume() {
   return volume;
 }
 
-// The springs of inner loops and of single voxels equal the lattice's springs to the last bit, in whatever
-// order rows are prepared. A coarse link is half as stiff as the four links below it together.
+// Springs read by the row or by the voxel equal the lattice's springs to the last bit, in whatever order rows
+// are prepared. A coarse link is half as stiff as the four links below it together.
 TEST(Lattice, CouplingsAreItsSpringsOnEveryLevel) {
   LatticeOptions options = made_of(elastic(1e4, 0.3));
   options.materials[2] = elastic(5e3, 0.45);

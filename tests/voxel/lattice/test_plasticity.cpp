@@ -23,7 +23,8 @@ TEST(Yield, IsElasticUpToItsStrainAndPerfectlyPlasticBeyond) {
     const auto gone = plastic_link(side * 5e-4, 0.0, y);
     EXPECT_DOUBLE_EQ(gone.elastic, side * y);
     EXPECT_DOUBLE_EQ(gone.offset, side * 3e-4);
-    // Unloaded, the link is at rest at its offset. Loading it again as far does not change the offset.
+    // Unloaded, the link is at rest at its offset. Loading it again to the same difference does not change
+    // the offset.
     EXPECT_EQ(plastic_link(gone.offset, gone.offset, y).elastic, 0.0);
     EXPECT_NEAR(plastic_link(side * 5e-4, gone.offset, y).offset, gone.offset, 1e-19);
   }
@@ -43,7 +44,7 @@ TEST(Yield, LeavesNoLimitOfTheChain) {
     EXPECT_GE(link.offset, std::min(before, difference) - 1e-7F);
     EXPECT_LE(link.offset, std::max(before, difference) + 1e-7F);
     EXPECT_LE(std::fabs(link.elastic), yield);
-    // A second evaluation changes nothing, except the last digit of a difference of up to 2.
+    // A second evaluation changes nothing beyond the rounding of a difference of up to 2.
     const auto again = plastic_link(difference, link.offset, yield);
     EXPECT_NEAR(again.offset, link.offset, 2.4e-7F);
   }

@@ -356,8 +356,8 @@ TEST(BoundarySprings, ACycleRoundWhatTheToolHoldsLeavesNoMore) {
   }
 }
 
-// The same for a patch that is small compared with the block, so that coarse levels hardly resolve it, and
-// for a sliding patch.
+// A cycle also leaves little error around a patch that is small compared with the block, and around a sliding
+// patch. Coarse levels hardly resolve such a small patch.
 TEST(BoundarySprings, ACycleRoundASmallOrSlidingPatchLeavesNoMore) {
   for (const int size : {48, 96}) {
     for (const Patch by : {Patch::held, Patch::slides}) {

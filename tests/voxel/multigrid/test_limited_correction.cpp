@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Corrections of many rows that the links' limits clip, against their definition.
+// Corrections of many rows, clipped by the links' limits, against their definition.
 #include "voxel/multigrid/limited_correction.h"
 
 #include <gtest/gtest.h>

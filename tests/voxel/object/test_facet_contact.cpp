@@ -168,8 +168,8 @@ TEST(PairContact, AVoxelBetweenFourIsHeldByAllOfThem) {
 }
 
 TEST(PairContact, ChainsFollowWhatLinksCannot) {
-  // Each voxel may come 0.95 spacings nearer to the voxel behind it. The voxels behind must give way for the
-  // rest.
+  // Each pressed voxel may come 0.95 spacings nearer to the voxel behind it. For the rest of the overlap, the
+  // voxels behind must give way.
   Stack stack({3, 3, 4}, 1e4, 2e4, 2.4 * kH);
   const voxel::PosedObject below{stack.below, stack.pose_below}, above{stack.above, stack.pose_above};
   for (PressedPair& pair : stack.pairs) EXPECT_LT(stack.press(pair), -0.4 * kH);

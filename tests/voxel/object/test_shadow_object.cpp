@@ -77,8 +77,8 @@ TEST(ShadowObject, AHeldContactComesToTheSameRest) {
   }
 }
 
-// The contact stays at rest for any number of exchanges. The two solvers must each find a part of the motion,
-// and not both the same part.
+// The contact stays at rest for any number of exchanges. The tick and the shadow each relax a part of the
+// motion, and must not both apply the same part.
 TEST(ShadowObject, AHeldContactStaysAtRest) {
   SoftBlock soft({41, 37, 25}, kH, kFirm);
   ShadowObject shadow(*soft.object);
@@ -103,8 +103,8 @@ TEST(ShadowObject, AHeldContactStaysAtRest) {
 }
 
 // A result is applied in parts while the tool is still. The force changes in even steps, because relaxation
-// finds no residual in between. It ends where a single step would end. The depth is so small that no limit is
-// active, because under active limits the result depends on the steps.
+// finds no residual in between. The final force is the same as after a single step. The depth is so small
+// that no limit is active, because under active limits the result depends on the steps.
 TEST(ShadowObject, AResultInPartsIsFeltInEvenSteps) {
   constexpr int parts = 8;
   SoftBlock whole({41, 37, 25}, kH, elastic(1e4, 0.3)), some({41, 37, 25}, kH, elastic(1e4, 0.3));
@@ -257,8 +257,8 @@ TEST(ShadowObject, DeferredChangesArePassedOnAtRest) {
 }
 
 // Applying a result takes longer than the time until the next submission. Rows that a tick moves meanwhile
-// are submitted together with their pending motion, and must not move by it twice. The block is released and
-// comes to rest.
+// are submitted together with their pending motion. This motion must not be applied twice. The block is
+// released and comes to rest.
 TEST(ShadowObject, RowsSubmittedWhileAResultIsAppliedMoveOnce) {
   SoftBlock soft({41, 37, 25}, kH, elastic(1e4, 0.3));
   ShadowObject shadow(*soft.object);

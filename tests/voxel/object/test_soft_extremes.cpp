@@ -35,7 +35,7 @@ struct Extreme {
 struct Outcome {
   bool finite = true;
   double violation_spacings =
-      0.0;  // largest violation of a limit, relative to the largest displacement or one spacing
+      0.0;  // largest violation of a limit, relative to the larger of one spacing and the displacement
   double most_force_N = 0.0;
   double left_spacings = 0.0;  // displacement left at the end
   bool asleep = false;
@@ -124,7 +124,8 @@ TEST(SoftExtremes, NoSlackAtAllMovesNothing) {
   EXPECT_EQ(o.left_spacings, 0.0);
 }
 
-// Links without slack along them but with slack across, or the reverse. Voxels then move as rows or layers.
+// Links with little or no slack along them and much slack across them, or the reverse. Voxels then move as
+// rows or as layers.
 TEST(SoftExtremes, SlackOneWayOnly) {
   expect_rest({.name = "none along", .material = of(1.0, 1.0, 0.6)});
   for (const double slack : {1e-4, 1e-2}) {
@@ -133,8 +134,8 @@ TEST(SoftExtremes, SlackOneWayOnly) {
   expect_rest({.name = "0.01 along", .material = of(0.99, 1.01, 0.6)});
 }
 
-// If there is nearly no slack in one way, clusters would need very many steps from limit to limit. So they
-// stay where the tool left them, but all other conditions hold.
+// Links with nearly no slack along them or across them. A cluster (cluster_steps.h) would need very many
+// steps from limit to limit to return. So it stays where the tool left it, but all other conditions hold.
 TEST(SoftExtremes, HardlyAnySlackOneWayOnlyIsKeptWithinItsLimits) {
   for (const LinkMaterial& material : {of(0.4, 1.6, 0.0), of(0.4, 1.6, 1e-6), of(1.0 - 1e-6, 1.0 + 1e-6, 0.6),
                                        of(1.0 - 1e-4, 1.0 + 1e-4, 0.6)}) {

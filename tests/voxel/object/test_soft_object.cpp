@@ -68,7 +68,8 @@ TEST(SoftObject, TheTightChainIsFelt) {
   std::cout << "largest difference " << 100 * worst << " %\n";
 }
 
-// This holds only at rest. A difference shows that the object is not at rest.
+// At rest, the anchors carry the felt force. After a single cycle the object is not at rest, and the forces
+// differ.
 TEST(SoftObject, AnchorsCarryWhatIsFelt) {
   for (const LinkMaterial& material : {elastic(1e4, 0.3), kFirm}) {
     SoftBlock soft({25, 25, 17}, kH, material);

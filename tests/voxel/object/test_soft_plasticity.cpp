@@ -70,7 +70,7 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
   // at twice the yield strain, half of the strain stays
   EXPECT_NEAR(column.hold_at(-2.0 * most), kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
-  // from there it is elastic up to the previous depth, and up to yield in the other direction
+  // from there the row is elastic up to the previous depth, and up to yield in the other direction
   EXPECT_NEAR(column.hold_at(-1.5 * most), 0.5 * kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
   EXPECT_NEAR(column.let_go(), -most, 1e-3 * most);
   EXPECT_NEAR(column.hold_at(1.0 * most), -kStiffness * yield * kH, 1e-3 * kStiffness * yield * kH);
@@ -80,12 +80,12 @@ TEST(SoftYield, ARowOfLinksYieldsAsOne) {
 TEST(SoftYield, TheWeakestLinkTakesWhatIsBeyond) {
   const double weak = 0.02, pressed = 0.5 * kH;
   Column column(0.2, weak);
-  // Eight links stretch by the force at which the ninth yields. The ninth takes the rest.
+  // Eight links are compressed by the force at which the ninth yields. The ninth takes the rest.
   EXPECT_NEAR(column.hold_at(-pressed), kStiffness * weak * kH, 2e-3 * kStiffness * weak * kH);
   EXPECT_NEAR(column.let_go(), -(pressed - 9 * weak * kH), 2e-3 * pressed);
 }
 
-// Pressed by a ball, released, and pressed half as deep again.
+// A block that a ball presses and then leaves.
 struct Dented {
   static constexpr std::array<int, 3> kSize{25, 25, 17};
 

@@ -23,7 +23,7 @@ constexpr double kTissuePa = 1e4;
 // A block of tissue with bone under `cover` voxels of it.
 struct Block {
   int cover;         // voxels of tissue above the bone
-  double ratio;      // modulus of bone over that of tissue
+  double ratio;      // modulus of bone, divided by the modulus of tissue
   bool embedded;     // true: a slab of bone with tissue around it; false: all below the cover is bone
   int every, shell;  // of ThinningOptions; every 0: not thinned
   int high;          // voxels

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Relaxation against direct solutions. Without active limits this is the solution of a linear problem, with
-// them that of a quadratic program.
+// Relaxation against direct solutions. Without active limits the reference solves a linear problem, with
+// active limits a quadratic program.
 #include "voxel/relaxation/relaxation.h"
 
 #include <gtest/gtest.h>

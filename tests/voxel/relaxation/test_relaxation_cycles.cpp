@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Relaxation in cycles that are split, ended early or limited. It must reach the same equilibrium as whole
-// cycles, and the optimum within limits.
+// Relaxation in cycles that are split, ended early or limited. Such cycles must reach the same equilibrium as
+// whole cycles, and the optimum within limits.
 #include <gtest/gtest.h>
 #include <algorithm>
 #include <cmath>

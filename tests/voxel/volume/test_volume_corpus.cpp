@@ -293,7 +293,7 @@ std::vector<Case> corpus() {
 }
 
 TEST_F(VolumeCorpus, EachIsReadRightOrRefusedInWords) {
-  ::testing::internal::CaptureStderr();  // the libraries talk while they fail
+  ::testing::internal::CaptureStderr();  // the libraries print messages when they fail
   std::size_t number = 0;
   for (const Case& c : corpus()) {
     fs::remove(in_folder(c.name));

@@ -91,7 +91,8 @@ TEST(CompareReports, WhatTakesHalfAsLongAgainIsFoundAndNothingElse) {
   }
   EXPECT_EQ(overall, 2U);  // the median and p99
   EXPECT_GE(times, 4U * kMeshes);
-  // Of the figures of single rows, the longest times grew most.
+  // The figures of single rows follow, sorted by how much a user notices. The longest times come first,
+  // because they grew most.
   EXPECT_EQ(comparison.figures[overall].key, "max_us");
   for (std::size_t i = overall + 1; i < times; ++i)
     EXPECT_GE(comparison.figures[i - 1].noticed, comparison.figures[i].noticed);
@@ -149,7 +150,7 @@ TEST(CompareReports, CountsThatDifferBetweenRunsOfABuildAreNoChange) {
   }
   EXPECT_EQ(changed_in(compare_reports(olds, news)), 0U);
   for (auto& report : olds)
-    report.suites["rigid"][0]["steps_max"] = 3;  // now the old build has one definite value
+    report.suites["rigid"][0]["steps_max"] = 3;  // now all runs of the old build agree
   EXPECT_EQ(changed_in(compare_reports(olds, news)), 1U);
 }
 

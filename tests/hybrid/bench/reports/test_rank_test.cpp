@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rank test against all permutations, its approximation against the exact test, and how often it calls
-// two samples of the same distribution different.
+// The rank test against all permutations, and its approximation against the exact test. Also tests how often
+// two samples of the same distribution are called different.
 #include "hybrid/bench/reports/rank_test.h"
 
 #include <gtest/gtest.h>
@@ -166,7 +166,7 @@ double called_changed(std::size_t runs, std::size_t figures, double common) {
 }
 
 TEST(RankTest, EqualDistributionsAreToldApartInAtMostFiveOfAHundred) {
-  // If the true rate is exactly 5 %, one simulation in a thousand exceeds this rate by chance.
+  // If the true rate is exactly 5 %, one simulation in a thousand exceeds `most` by chance.
   const double most = 0.05 + 3.1 * std::sqrt(0.05 * 0.95 / kComparisons);
   for (const std::size_t runs : {std::size_t{4}, std::size_t{5}, std::size_t{9}}) {
     for (const double common : {0.0, 0.5, 0.9, 1.0}) {

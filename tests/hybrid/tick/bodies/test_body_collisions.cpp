@@ -334,7 +334,7 @@ TEST_F(BodyCollisions, AStackStands) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// A body on a path keeps its motion. A body without space between two others is not thrown.
+// A body on a path keeps its motion. A free body that has no space left between two others is not thrown out.
 TEST_F(BodyCollisions, SqueezedBetweenTwoItIsAFaultAndStaysFinite) {
   const std::string piston =
       "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 20\npoints = [[0, 0, 40], [0, 0, "
@@ -367,7 +367,8 @@ TEST_F(BodyCollisions, TheToolFeelsTheWallThroughABody) {
   EXPECT_EQ(touch.state().faults, 0U);
 }
 
-// Knobbly meshes, and edge against edge. The overlap is at most the depth that fits between sample points.
+// Tests knobbly meshes, crossed rods, and a box on a mesh. The overlap is at most the depth that fits between
+// the sample points.
 TEST_F(BodyCollisions, OfMeshesAndEdgesOnlyWhatLiesBetweenPointsOverlaps) {
   polygon::TriangleMesh knobs = polygon::make_ball_mesh(0.02, 4);
   for (dvec3& v : knobs.vertices)
@@ -420,7 +421,7 @@ TEST_F(BodyCollisions, BesideTissueBoneStopsIt) {
     touch.at(kFarAway);
     worst = std::max(worst, overlap.deepest());
   }
-  // It rests on the bone with its radius of 8 mm.
+  // At rest the ball's centre is its radius of 8 mm above the bone.
   EXPECT_NEAR(state_of(touch, 0).centre_m.z, 0.008, 2e-5);
   EXPECT_EQ(worst, 0.0);
   EXPECT_EQ(touch.state().faults, 0U);

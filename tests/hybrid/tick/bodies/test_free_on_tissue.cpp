@@ -121,9 +121,9 @@ TEST_F(FreeOnTissue, TwoBodiesInOneObjectComeToRestAndAreBothCarried) {
   }
 }
 
-// The carried force is the derivative of the springs' energy by the body's way, with either kind of
-// relaxation. For a free box at the same place it may differ, because other voxels lie beside a box that has
-// turned.
+// The force that carries a body held at one place is the derivative of the springs' energy with respect to
+// that place, with either kind of relaxation. A free box at the same place may be carried by another force:
+// it may have turned, and other voxels then lie beside it.
 TEST_F(FreeOnTissue, OnTightLinksABodyThatIsHeldIsCarriedByWhatItsWayTakes) {
   struct Case {
     std::string name, shape;

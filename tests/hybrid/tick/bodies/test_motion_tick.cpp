@@ -206,8 +206,8 @@ TEST_F(Motion, APuckPushedSteadilyFeelsItsDrag) {
   TickResult felt;
   for (int n = 0; n < 3000; ++n) felt = touch.at({-0.02 + speed * 1e-3 * n, 0, 0});
   std::printf("puck with drag: %.4f N of %.4f N\n", -felt.force_N.x, drag * speed);
-  // The body gives way within the tick. So the force at the end of the tick, which pushes the body, is K v dt
-  // less than the felt force.
+  // The body gives way within the tick. So the force that pushes it at the end of the tick is K v dt less
+  // than the felt force.
   EXPECT_NEAR(-felt.force_N.x, drag * speed, 1.01 * kToolStiffness * speed * 1e-3);
   EXPECT_GE(-felt.force_N.x, drag * speed - 1e-9);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Shading, texture and damping in the whole tick. The shaded force is along the normal of the surface that
-// the facets approximate. A relief has its wavelength, and damping only resists.
+// the facets approximate. The force over a relief has the wavelength of the relief. Damping only resists.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -58,8 +58,8 @@ double p99(const std::vector<double>& sorted) {
 class Shading : public Feel, public ::testing::WithParamInterface<double> {};
 
 // The reference normal is the sphere's normal at the proxy, the direction from the ball's centre to the
-// proxy. At the device it is the same within the measured angle, because the force points from the device to
-// the proxy.
+// proxy. The sphere's normal at the device is the same within the measured angle, because the force points
+// from the device to the proxy.
 TEST_P(Shading, TurnsTheForceToTheSphereThatTheFacetsStandFor) {
   RigidDescription flat = ball(), smooth = ball();
   smooth.feel.shading = true;
@@ -200,7 +200,7 @@ TEST_F(Texture, ClosedWaysOverAFlatReliefGiveTheHandNothing) {
         std::printf("energy, %s%s, %s: the hand gains %+.3g mJ\n", image ? "image" : "pattern",
                     friction ? ", rough" : "", way.name, 1e3 * gain.work_J);
         // Between ticks the force is not linear along the path. So the trapezoidal rule has an error of a
-        // millionth of the exchanged energy. It vanishes with the step.
+        // millionth of the exchanged energy. The error vanishes with the step.
         EXPECT_LE(gain.work_J, friction ? 0.0 : 1e-8);
       }
     }

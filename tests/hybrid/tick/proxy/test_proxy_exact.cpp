@@ -22,8 +22,9 @@ using tests::HostileMesh;
 
 enum class Gait { stroke, dash, jump };
 
-// The device's path. It leads under the surface along its vertices at up to 0.2 mm per tick, across the
-// surface at 1 mm per tick, or jumps between random places.
+// The device's path, in one of three gaits. A stroke goes from vertex to vertex, mostly under the surface, at
+// up to 0.2 mm per tick. A dash goes between random places at 1 mm per tick. The third gait jumps between
+// random places.
 class Walk {
  public:
   Walk(const polygon::TriangleMesh& mesh, Gait gait, std::uint64_t seed)

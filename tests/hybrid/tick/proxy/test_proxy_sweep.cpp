@@ -87,7 +87,7 @@ TEST_F(RigidSweep, ABallOfFacetsDoesSoWithinOnePercent) {
   const auto& t = icosphere.triangles.front();
   const double edge = glm::length(icosphere.vertices[t[0]] - icosphere.vertices[t[1]]);
   ASSERT_LT(1.5 * edge * edge / (6.0 * radius),
-            0.01 * 1e-3);  // 1.5 times this is below one percent of the smallest depth
+            0.01 * 1e-3);  // the error, times 1.5, is below one percent of the smallest depth
   Touch touch(scene_of({mesh("ball", icosphere)}, 5e-3), {0, 0, 0.1});
   for (int n = 0; n < 20; ++n) {
     const dvec3 out = random_direction(random);
@@ -257,7 +257,7 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
     }
     EXPECT_EQ(touch.state().faults, 0U) << "scale " << w.scale << ", offset " << w.offset.x;
   }
-  // The same for a curved mesh, which has planes in all directions.
+  // Repeats the test on a curved mesh, which has planes in all directions.
   std::optional<std::vector<dvec3>> first;
   for (const Where& w : places) {
     auto ball = mesh("ball", polygon::make_ball_mesh(0.02 * w.scale, 4));
@@ -274,7 +274,8 @@ TEST_F(RigidSweep, SizeAndPlaceOfTheSceneDoNotMatter) {
     double worst = 0.0;
     for (std::size_t n = 0; n < proxies.size(); ++n)
       worst = std::max(worst, glm::length(proxies[n] - (*first)[n]));
-    // If planes move by rounding, a minimum in a shallow valley of facets moves by the square root of that.
+    // Rounding moves the planes of the facets. In a shallow valley of facets, the minimum then moves by the
+    // square root of this motion.
     EXPECT_LE(worst, 1e-7 + std::sqrt(2.0 * 5e-3 * 100.0 * w.rounding))
         << "scale " << w.scale << ", offset " << w.offset.x;
   }
@@ -372,9 +373,10 @@ TEST_F(RigidSweep, OnAFinelyFacetedBallTheProxyIsAtTheNearestFace) {
       elsewhere += depth > least * (1.0 + 1e-9) ? 1 : 0;
       worst = std::max(worst, depth / least - 1.0);
     }
-    // Normals of neighbouring facets differ by up to 11 degrees, which is 1.8 % of the depth. A twentieth of
-    // that is allowed as hysteresis. The nearest face may be up to three edges away, around a corner. The
-    // first edge counts for at least a quarter of the whole, hence the factor 4.
+    // Normals of neighbouring facets differ by up to 11 degrees. So the depths under them differ by up to 1.8
+    // %, and a twentieth of this is allowed as hysteresis. The nearest face may be up to three edges away,
+    // around a corner. The first of these edges makes up at least a quarter of the difference, hence the
+    // factor 4.
     EXPECT_LE(worst, 4.0 * 0.05 * 0.018) << r;
     EXPECT_LE(elsewhere, ticks / 10) << r;
     EXPECT_EQ(touch.state().truncated_ticks, 0U);

@@ -59,8 +59,8 @@ TEST(RestingTissue, ABrainStaysOutsideItsSkullAndComesToRest) {
   double step = 0.0;
   for (std::size_t n = 900; n < 1040; ++n)
     step = std::max(step, std::fabs(course.force_N[n] - course.force_N[n - 1]));
-  // This also holds soon after the tool stopped, when asynchronous results still arrive. Each is applied in
-  // parts, and no part changes the force noticeably (by more than 7 %).
+  // Soon after the tool stopped, asynchronous results still arrive. Each result is applied in parts, and no
+  // part changes the force noticeably (by more than 7 %).
   double result = 0.0;
   for (std::size_t n = 700; n < 1040; ++n)
     result = std::max(result, std::fabs(course.force_N[n] - course.force_N[n - 1]));

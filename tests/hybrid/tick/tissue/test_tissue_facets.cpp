@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tools of about a spacing never pass between the voxels of a surface, whatever the limits of the links.
+// Tools with a radius of up to one spacing do not pass between the voxels of a surface. If very wide limits
+// of the links let a tool through, a fault reports this.
 #include "hybrid/tick/tissue/tissue_facets.h"
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The share of its work that a tick does follows the time that ticks take.
+// A tick does only a share of its work. The share follows the time that ticks take.
 #include "hybrid/tick/tissue/work_budget.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,8 @@ TEST(WorkShare, FollowsWhatTicksTake) {
     return static_cast<int>(share.steps());
   };
   EXPECT_EQ(felt(1000, 390.0, true), 0);
-  // After a late tick the share falls at once, further the later the tick, but not below a third.
+  // After a late tick the share falls at once: by one step, or by two if the tick was very late. It never
+  // falls below a third.
   EXPECT_EQ(felt(1, 450.0, true), 1);
   EXPECT_EQ(felt(1, 800.0, true), 3);
   EXPECT_EQ(felt(100, 5000.0, true), hybrid::WorkShare::kMostSteps);
@@ -26,8 +27,8 @@ TEST(WorkShare, FollowsWhatTicksTake) {
   EXPECT_EQ(felt(2000, 250.0, true), 0);
 }
 
-// On a machine whose ticks take as long as their work, the share does not oscillate: tick times stay in
-// between.
+// The time of a tick grows with its work. The share must not oscillate, so hardly any tick takes longer than
+// half a period.
 TEST(WorkShare, ComesToRestOnAMachineOfAnySpeed) {
   for (const double slow : {0.5, 1.0, 2.0, 2.5}) {
     hybrid::WorkShare share(1e-3);
@@ -40,8 +41,5 @@ TEST(WorkShare, ComesToRestOnAMachineOfAnySpeed) {
     EXPECT_LE(late, 5) << slow;
   }
 }
-
-// All state besides tissue: a body on a path and a free body, friction, shading, damping and a relief, on
-// meshes and primitives.
 
 }  // namespace
