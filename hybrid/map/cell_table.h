@@ -277,8 +277,8 @@ class CellTable {
       const std::uint32_t place = prefetch(finalised(parts[d][1] ^ beside));
       std::uint32_t& hint = trail.place[here ^ (1U << d)];
       hint = place != kNone ? place : hint;
-      // Also prefetches the tags of the places one step further. The tags must be read before an entry there
-      // can be prefetched.
+      // Also prefetches the tags of the places two steps ahead and diagonally ahead. Tags must be read before
+      // an entry there can be prefetched.
       __builtin_prefetch(&chunks_[home(finalised(parts[d][2] ^ beside))]);
       __builtin_prefetch(&chunks_[home(finalised(parts[d][1] ^ parts[e][1] ^ parts[f][0]))]);
     }
