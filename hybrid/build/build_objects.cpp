@@ -78,7 +78,7 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-// Repairs by the file's reader are reported to the user.
+// Adds notes for the user: the repairs by the file's reader.
 void add_notes(const std::string& object, const std::filesystem::path& file,
                const std::vector<std::string>& of_file, std::vector<BuildNote>& notes) {
   for (const std::string& note : of_file)
@@ -92,12 +92,14 @@ voxel::LabelVolume read_volume(const std::string& object, const std::filesystem:
   return volume;
 }
 
-// A range of intensities is asked for, and not labels. A grown surface has no intensities.
+// Does the surface follow intensities? It does for a range of intensities, but not for labels. A grown
+// surface has no intensities.
 bool follows_intensities(const VolumeSurfaceSource& s) {
   return s.rules.size() == 1 && s.rules[0].lower < s.rules[0].upper && s.grow_m == 0.0;
 }
 
-// Both return the surface in the frame of `volume`, which receives the labels.
+// intensity_surface() and label_surface() return the surface in the frame of `volume`, which receives the
+// labels.
 polygon::TriangleMesh intensity_surface(const std::string& object, const VolumeSurfaceSource& s,
                                         const voxel::VolumeFileOptions& options, voxel::LabelVolume& volume,
                                         std::vector<BuildNote>& notes) {
@@ -113,7 +115,7 @@ polygon::TriangleMesh intensity_surface(const std::string& object, const VolumeS
          "a larger spacing for one between them"});
     return surface_from_labels(volume, s.smooth);
   }
-  // Whole numbers are rounded: 300 is all from 299.5 on.
+  // Whole numbers are rounded intensities: 300 stands for 299.5 to 300.5.
   const double rounded = read.whole_numbers ? 0.5 : 0.0;
   return surface_from_intensities(
       volume, {read.intensities, s.rules[0].lower - rounded, s.rules[0].upper + rounded}, s.smooth);

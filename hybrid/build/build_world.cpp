@@ -25,9 +25,11 @@ namespace hybrid {
 namespace {
 
 constexpr int kSurfaceSmoothing = 6;  // smoothing passes of a soft object's drawn surface
-// Most cells along the scene's longest side by default. They lie in at most 64 bricks at any alignment.
+// Default limit on the number of cells along the scene's longest side. The cells lie in at most 64 bricks at
+// any alignment.
 constexpr double kMostCells = 504.0;
-constexpr double kRigidCells = 200.0;      // the same if nothing is soft; finer cells exclude no more objects
+constexpr double kRigidCells =
+    200.0;  // default limit if nothing is soft; finer cells exclude no more objects
 constexpr std::size_t kMapReserve = 2048;  // spare bricks for motion
 
 struct Box {

@@ -33,7 +33,8 @@ struct BuiltScene {
 // Called with a message at the start of each step; may be an empty function.
 using Progress = std::function<void(const std::string&)>;
 
-// Default cell of the occupancy map (m) for a scene of rigid objects alone with the given longest side.
+// Default cell size (m) of the occupancy map for a scene of rigid objects alone. `longest_m`: the scene's
+// longest side.
 double rigid_cell_m(double longest_m, double tool_radius_m);
 
 // Throws SceneError if a file cannot be used, if no voxels are left after overlap removal, if the memory is
@@ -49,8 +50,8 @@ struct ObjectBox {
 ObjectBox object_box(const World& world, std::size_t object);
 std::string in_words(const ObjectBox& box);
 
-// Largest memory (bytes) of a soft object with these dimensions before it is touched: its file's contents,
-// its lattice (at most 2.5 bytes a voxel), its surface and its part of the map.
+// Upper bound on the memory (bytes) of a soft object with these dimensions before it is touched: its file's
+// contents, its lattice (at most 2.5 bytes a voxel), its surface and its part of the map.
 std::uint64_t soft_load_bytes(const std::array<int, 3>& dims);
 // Memory (bytes) of a soft object after all of it has moved: state, coarse levels, and link stiffness if
 // there are several labels. A session needs it only for tissue that the tool or relaxation reached.

@@ -12,8 +12,8 @@
 namespace hybrid {
 namespace {
 
-// A hand takes a surface for rigid from about this stiffness on: 153 to 415 N/cm in Tan, Srinivasan, Eberman
-// & Cheng, "Human factors for the design of force-reflecting haptic interfaces" (1994).
+// From about this stiffness on, a hand perceives a surface as rigid: 153 to 415 N/cm in Tan, Srinivasan,
+// Eberman & Cheng, "Human factors for the design of force-reflecting haptic interfaces" (1994).
 constexpr double kRigidToAHand_N_per_m = 25e3;
 // Force limit assumed for a device without one: that of the largest device known here.
 constexpr double kStrongForce_N = 37.5;
@@ -42,8 +42,8 @@ struct Choice {
 };
 
 // The felt stiffness is that of tissue and coupling in series. It is limited by the stiffness that the device
-// can render, and by the stiffness from which on a hand takes a surface for rigid. If it is within a just
-// noticeable difference of the felt stiffness of a rigid surface, voxels are not needed.
+// can render, and by the stiffness from which on a hand perceives a surface as rigid. Voxels are not needed
+// if the felt stiffness of a rigid surface differs from it by less than a just noticeable difference.
 Choice choose(const Scene& scene, const SoftDescription& soft) {
   if (scene.tool.shape == Tool::Shape::punch) return {false, "a punch is felt by voxels alone"};
   const device::DeviceLimits limits = scene_limits(scene);
@@ -98,8 +98,9 @@ RigidDescription as_rigid(const SoftDescription& soft) {
                                 .unit_m = volume.unit_m};
     if (volume.spacing_m) surface.spacing_m = volume.spacing_m->x;
     surface.largest = volume.largest;
-    // The rule once more changes no label. With two rules the surface follows the voxels, as that of the soft
-    // object does (build_objects.cpp), so that models of one object differ by the model alone.
+    // Repeats the rule, which changes no label. A surface with two rules follows the voxels and not the
+    // intensities (build_objects.cpp), as the surface of the soft object does. So nothing but the model
+    // differs between the two models of an object.
     if (surface.rules.size() == 1) surface.rules.push_back(surface.rules.front());
     rigid.source = surface;
   }

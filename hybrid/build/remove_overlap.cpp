@@ -46,8 +46,8 @@ std::size_t remove_rigid_overlap(const std::vector<RigidObject>& rigid, voxel::L
         if (volume.labels[volume.index(i, j, k)] == 0) continue;
         const glm::dvec3 p = volume.origin_m + volume.rotation * (glm::dvec3(i, j, k) * volume.spacing_m);
         const RigidDistance near = rigid_distance(rigid, p, clear + kQueryAhead * h);
-        // No surface is nearer to p than near.distance. Voxels of the row that are further from the surface
-        // than `clear` get the same result without a query.
+        // No surface is nearer to p than near.distance. So the next voxels of the row that must be further
+        // than `clear` from any surface get the same result without a query.
         const int run = std::max(0, static_cast<int>((near.distance - clear) / volume.spacing_m.x));
         const int last = std::min(volume.dims[0] - 1, i + run);
         for (; i <= last; ++i) {

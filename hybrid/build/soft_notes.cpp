@@ -36,7 +36,7 @@ void note_felt_surface(const Tool& tool, const std::string& name, const voxel::S
   const glm::dvec3 h = object.lattice().spacing_m();
   const double thick = largest(h), fine = smallest(h);
   const bool ball = tool.shape == Tool::Shape::ball;
-  // A punch is pressed by balls of half the smallest spacing, whatever its radius.
+  // A punch is pressed by balls whose radius is half the smallest spacing, whatever the punch's radius.
   const double reach = ball ? object.reach(tool.radius_m) : tool.radius_m + object.voxel_radius();
   const FeltLattice felt = felt_lattice(h, tool.radius_m, reach);
   if (thick > kThickSlices * fine) {

@@ -13,10 +13,11 @@ namespace hybrid {
 // Slices thicker than this (unit: pixel size) move the felt surface by an eighth of a pixel or more.
 inline constexpr double kThickSlices = 1.25;
 
-// How voxels of this spacing are felt. A voxel is a ball of half the smallest spacing, and a ball that could
-// slip between voxels is felt as the smallest one that cannot (voxel/object/soft_object.h).
+// How voxels of this spacing are felt. A voxel is felt as a ball whose radius is half the smallest spacing. A
+// tool that could slip between voxels is felt as the smallest ball that cannot (voxel/object/soft_object.h).
 struct FeltLattice {
-  // Across the thickest axis the tool meets the surface this far inside of its volume; negative: outside.
+  // Along the axis with the largest spacing, the felt surface lies this far inside the drawn one; negative:
+  // outside.
   double inside_m = 0.0;
   double dip_m = 0.0;          // how much deeper the tool sinks between two voxels along that axis
   double felt_radius_m = 0.0;  // radius of the tool as it is felt
@@ -29,7 +30,7 @@ void note_felt_surface(const Tool& tool, const std::string& name, const voxel::S
 
 // note_missing_labels() reports labels that the description names and the volume does not have. `volume`: as
 // read, before overlap is removed. note_missing_anchors() reports a distance `rigid_within` within which no
-// voxel lies. `near_rigid`: the voxels within it.
+// voxel lies. `near_rigid`: the voxels within that distance.
 void note_missing_labels(const SoftDescription& description, const voxel::LabelVolume& volume,
                          std::vector<BuildNote>& notes);
 void note_missing_anchors(const SoftDescription& description, std::span<const std::size_t> near_rigid,

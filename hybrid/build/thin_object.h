@@ -6,8 +6,8 @@
 
 namespace hybrid {
 
-// Thins the volume as the scene asks, gives struts their material, makes them anchors where their labels are,
-// and notes the saving in `notes` and `body`. Throws SceneError.
+// Thins the volume as the scene asks, and gives struts their material. Struts in place of an anchored label
+// become anchors. Notes the saving in `notes` and `body`. Throws SceneError.
 void thin_object(const Scene& scene, const SoftDescription& description, voxel::LabelVolume& volume,
                  voxel::LatticeOptions& options, SoftBody& body, std::vector<BuildNote>& notes);
 

@@ -68,8 +68,8 @@ class HeightTexture {
 };
 
 // Height over the surface (m) and its gradient at a point, in the body's frame. The height is between
-// −height_m and 0: the brightest places are the surface itself, and dark places are deeper. Contact begins at
-// the surface. So bright places above the surface would make the force jump at first contact.
+// −height_m and 0: the brightest places are the surface itself, and dark places are deeper. Places above the
+// surface would make the force jump at first contact, because contact begins at the surface.
 struct Relief {
   double height_m = 0.0;
   glm::dvec3 gradient{0.0};

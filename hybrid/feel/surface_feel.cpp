@@ -63,9 +63,9 @@ FrictionStep friction_target(const glm::dvec3& proxy, const glm::dvec3& target, 
     step.target = proxy;
     return step;
   }
-  // The slide moves the proxy by C (f_t − μN û), where C is the compliance A⁻¹ within the plane. This changes
-  // the normal force by −a times that force, with a = n·A⁻¹û / n·A⁻¹n. Let N be the normal force after the
-  // slide and N₀ that before. Then N (1 − μa) = N₀ − a f_t.
+  // The slide moves the proxy by C (f_t − μN û), where C is the compliance A⁻¹ within the plane. A tangential
+  // force f changes the normal force by −a f along the slide, with a = n·A⁻¹û / n·A⁻¹n. Let N be the normal
+  // force after the slide and N₀ that before. Then N (1 − μa) = N₀ − a f_t.
   step.sliding = true;
   const glm::dvec3 along = tangential / step.tangential_N;
   const glm::dmat3 compliance = glm::inverse(metric);

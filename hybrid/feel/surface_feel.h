@@ -49,18 +49,20 @@ struct FrictionStep {
 };
 
 // The proxy must be feasible, and must have been carried along with the surface since the last tick. The pull
-// f = A (target − proxy) acts on it against a surface with the unit normal `normal`. The proxy stays while
-// the pull is within the friction cone. This is the static cone if the proxy was at rest. If it was sliding
-// it is the dynamic cone, because only there it comes to rest by itself. Otherwise the target is moved back
-// by the friction force, that is by A⁻¹ μN û. Here û is the pull's tangential direction and N the normal
-// force after the slide (for A = K·1 equal to that before). At the end of the slide the tangential force is
-// exactly μN. If the pull is on the dynamic cone the proxy does not move, so the force is continuous there.
+// on the proxy is f = A (target − proxy), and the surface has the unit normal `normal`. The proxy stays while
+// the pull is within the friction cone. A proxy at rest has the static cone. A sliding proxy has the dynamic
+// cone, because only there it comes to rest by itself.
+//
+// If the pull is outside the cone, the proxy slides: the target is moved back by A⁻¹ μN û. Here û is the
+// pull's tangential direction, and N is the normal force after the slide (for A = K·1 equal to that before
+// the slide). At the end of the slide the tangential force is exactly μN. If the pull is on the dynamic cone
+// the proxy does not move, so the force is continuous there.
 //
 // On a plane the step ends between the proxy and the frictionless minimum. So ½ (target − q)ᵀ A (target − q)
-// never grows: the work of the hand is stored or dissipated. On a curved surface the way can be longer.
-// `friction_dissipates` tells whether the step lost energy. If it did not, the proxy must stay.
+// never grows: the work of the hand is stored or dissipated. On a curved surface the step can be longer.
+// friction_dissipates() tells whether the step lost energy. If it did not, the proxy must stay.
 //
-// A proxy that slid in one pass of a tick is passed as sliding to the later passes and to the next tick.
+// If the proxy slid in one pass of a tick, pass `sliding` = true in the later passes and in the next tick.
 FrictionStep friction_target(const glm::dvec3& proxy, const glm::dvec3& target, const glm::dmat3& metric,
                              const glm::dvec3& normal, double static_friction, double dynamic_friction,
                              bool sliding) noexcept;
@@ -94,7 +96,7 @@ struct DampingState {
   double depth_m = 0.0;
   double wanted_N = 0.0;     // damping force of the last tick, whether or not it was applied
   double balance_J = 0.0;    // recent work of the hand on the damper
-  double earned_J = 0.0;     // work since damping was suspended, if it had been applied
+  double earned_J = 0.0;     // work since damping was suspended, as if damping were applied
   double resume_at_J = 0.0;  // value of earned_J at which damping resumes
   bool touching = false, felt = true;
 };
@@ -103,9 +105,9 @@ struct DampingState {
 // never pulls the tool in. It resists motion in both directions. Sampled damping is not passive by itself
 // (Colgate & Schenkel 1997). So the work of the hand on the damper is accounted, with an exponential memory
 // of kDampingMemory_s. If the damper has returned more than it received, it is suspended until it would have
-// earned twice the deficit. Each further suspension takes at least twice as much as the one before. So the
-// damper cannot feed an oscillation, however long the contact lasts. The next contact starts with an empty
-// account.
+// earned twice the deficit. Each further suspension has to earn at least twice as much as the one before. So
+// the damper cannot feed an oscillation, however long the contact lasts. The next contact starts with an
+// empty account.
 inline constexpr double kDampingMemory_s = 0.05;
 // With `account` false, damping is always applied: plain sampled damping.
 double damping_force(DampingState& state, double normal_N, double depth_m, double damping_N_s_per_m,
@@ -127,11 +129,11 @@ glm::dvec3 limit_shaded_normal(const glm::dvec3& shaded, const glm::dvec3& norma
                                double least_cosine = kLeastShadedCosine) noexcept;
 
 // The metric M in which the proxy moves freely along the pull of the shaded normals, and hardly across it.
-// Consider the step to the minimum of (q − goal)ᵀ M (q − goal) on the true planes. It ends where lines from
-// the goal along the shaded normals meet the surface, so A (goal − q) is in their span. Repeat with the
-// shaded normals at q until q stays. Each pass reduces the distance by the factor depth / (tool radius +
-// radius of curvature that the normals suggest). The factor is below 1 if the depth is below that sum. At
-// most three normals count. Returns `metric` if there are none.
+// The proxy moves to the q on the true planes that minimises (q − goal)ᵀ M (q − goal). There lines from the
+// goal along the shaded normals meet the surface, so A (goal − q) is in the span of these normals. Repeat
+// with the shaded normals at q until q stays. Each pass reduces the distance by the factor depth / (tool
+// radius + radius of curvature that the normals suggest). The factor is below 1 if the depth is below that
+// sum. At most three normals count. Returns `metric` if there are none.
 glm::dmat3 shading_metric(const glm::dmat3& metric, std::span<const glm::dvec3> shaded_normals) noexcept;
 
 }  // namespace hybrid

@@ -2,9 +2,9 @@
 // A sparse set of bricks of 8×8×8 cells, the basis of every layer of the occupancy map.
 //
 // A hash table maps a brick's coordinates to a layer's entry (cell_table.h). In front of the table is a
-// bitmap of 64×64×64 units over all existing bricks; a unit is one brick, or a power of two bricks along each
-// edge. The bitmap takes 32 kB, so it stays in the first-level cache. A query of an empty region ends after
-// one to four words.
+// bitmap of 64×64×64 units over all existing bricks. A unit is one brick, or a power of two bricks along each
+// edge. The bitmap takes 32 kB, so it stays in the first-level cache. A query of an empty region reads only
+// one to four words of the bitmap.
 #pragma once
 
 #include <algorithm>
@@ -142,10 +142,10 @@ class BrickGrid {
   // Rounds down to an integer without std::floor, which is a function call on older instruction sets. NaN
   // becomes the highest cell.
 #if defined(__x86_64__)
-  [[nodiscard]] static __m128i floor_cells(__m128d scaled) noexcept {  // of two values
+  [[nodiscard]] static __m128i floor_cells(__m128d scaled) noexcept {  // both values at once
     const __m128d x = _mm_max_pd(_mm_min_pd(scaled, _mm_set1_pd(kFarthestCell)), _mm_set1_pd(-kFarthestCell));
     const __m128i cell = _mm_cvttpd_epi32(x);
-    const __m128i above = _mm_castpd_si128(_mm_cmpgt_pd(_mm_cvtepi32_pd(cell), x));  // 64 bits each
+    const __m128i above = _mm_castpd_si128(_mm_cmpgt_pd(_mm_cvtepi32_pd(cell), x));  // 64 bits per value
     return _mm_add_epi32(cell, _mm_shuffle_epi32(above, 0x08));
   }
 #else

@@ -34,9 +34,9 @@ using CellCoordinates = std::array<std::int32_t, 3>;
 inline constexpr std::int32_t kNoPlace = std::numeric_limits<std::int32_t>::min();
 
 // A caller's cache between queries, so that queries along a path need no hashing. It contains the place of
-// the last entry, the direction of the path, and places of neighbouring entries: one for each parity of the
-// three coordinates, so that a box of 2×2×2 has all its eight. The contents are hints only: results are the
-// same with any trail and any table. Each thread needs its own.
+// the last entry, the direction of the path, and the places of eight neighbouring entries. There is one for
+// each parity of the three coordinates, so all entries of a box of 2×2×2 fit. The contents are hints only:
+// results are the same with any trail and any table. Each thread needs its own.
 struct CellTrail {
   std::uint32_t here = 0;  // place of the last entry found
   std::array<std::uint32_t, 8> place{};
@@ -106,8 +106,8 @@ class CellTable {
     return entries_.size() * sizeof(Entry) > (std::size_t{1} << 19);
   }
 
-  // Prefetches for a find() that follows. Several prefetches wait for memory together. (always_inline: GCC 12
-  // takes a function that only prefetches for one without effect, and drops its calls.)
+  // Prefetches for a find() that follows. Several prefetches wait for memory together. always_inline is
+  // needed: GCC 12 considers a function that only prefetches to be without effect, and drops its calls.
   [[gnu::always_inline]] void prefetch(const CellCoordinates& at) const noexcept { (void)prefetch(hash(at)); }
   // Returns the probable place, judged by its tag alone; kNone: the entry is probably missing.
   [[gnu::always_inline]] std::uint32_t prefetch(std::uint64_t h) const noexcept {
@@ -127,7 +127,7 @@ class CellTable {
     const std::uint32_t found = find(at, h);
     return found != kNone ? found : add(at, h, may_allocate, moved);
   }
-  // The same for an entry that is known to be missing.
+  // Adds and starts an entry that is known to be missing. Otherwise like find_or_add().
   template <class Moved>
   std::uint32_t add(const CellCoordinates& at, bool may_allocate, Moved&& moved) {
     return add(at, hash(at), may_allocate, moved);
@@ -277,7 +277,8 @@ class CellTable {
       const std::uint32_t place = prefetch(finalised(parts[d][1] ^ beside));
       std::uint32_t& hint = trail.place[here ^ (1U << d)];
       hint = place != kNone ? place : hint;
-      // Prefetches the tags of the places beyond, which must be read before an entry there can be fetched.
+      // Also prefetches the tags of the places two steps ahead and diagonally ahead. Tags must be read before
+      // an entry there can be prefetched.
       __builtin_prefetch(&chunks_[home(finalised(parts[d][2] ^ beside))]);
       __builtin_prefetch(&chunks_[home(finalised(parts[d][1] ^ parts[e][1] ^ parts[f][0]))]);
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The moving rigid surfaces of the occupancy map.
 //
-// A body's surface cells are rasterised once, in its own frame, and move with it. They are never stale, at
+// A body's surface cells are rasterised once, in its own frame, and move with it. So they are never stale, at
 // any speed, and never rewritten. The scene keeps only the positions of bodies. Districts are cells as large
 // as the largest body, so that each body lies in at most eight of them. A district lists the bodies whose
 // bounds touch it. A move changes only the districts that the body leaves or enters. A query looks up its
@@ -31,7 +31,8 @@ class MovingSurfaceLayer {
   void move(std::uint32_t object, const glm::dvec3& position, const glm::dquat& rotation) noexcept;
 
   [[nodiscard]] bool empty() const noexcept { return bodies_.empty(); }
-  // Is there moving surface in a brick (of its body's own cells) that the box touches?
+  // Does the box touch a brick in which a moving body has surface? The bricks are those of the body's own
+  // cells.
   [[nodiscard]] bool any_near(const glm::dvec3& low, const glm::dvec3& high) const noexcept;
   // Bits of the moving objects with surface in cells that the box touches: a superset of the exact answer.
   [[nodiscard]] std::uint64_t objects_in(const glm::dvec3& low, const glm::dvec3& high) const noexcept;

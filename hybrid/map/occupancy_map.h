@@ -84,8 +84,8 @@ class OccupancyMap {
   [[nodiscard]] std::size_t memory_bytes() const;
   // Bricks that contain soft voxels.
   [[nodiscard]] std::size_t soft_bricks() const noexcept { return soft_.bricks(); }
-  // Number of moves that found no room for a brick: raise the reserve. Such a voxel stays listed in its last
-  // cell.
+  // Number of moves that found no room for a brick. The voxel then stays listed in its last cell. Raise the
+  // reserve if it is not 0.
   [[nodiscard]] std::uint64_t overflows() const { return soft_.overflows(); }
   // Number of districts that moving bodies entered or left since they were added.
   [[nodiscard]] std::uint64_t district_changes() const noexcept { return moving_.district_changes(); }

@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kBlocksOfNewBrick = 4;  // per new brick; a surface occupies about half of the eight
+constexpr std::size_t kBlocksOfNewBrick = 4;  // blocks to reserve; a surface fills about half of the 8
 // Voxels expected per block on load. A surface has 10 per block; expecting fewer leaves spare blocks for
 // motion.
 constexpr std::size_t kVoxelsOfBlock = 9;
@@ -60,7 +60,7 @@ void VoxelLayer::seal(std::size_t more_bricks) {
   bricks_.seal(more, [this](const Brick& brick, std::uint32_t place) { set_place(brick, place); });
   blocks_.seal(std::min(kBlocksOfNewBrick * more, next_.size()),
                [this](const Block& block, std::uint32_t place) { set_place(block, place); });
-  std::vector<Full, HugePages<Full>> full;  // exactly this capacity, in one copy
+  std::vector<Full, HugePages<Full>> full;  // copied once, to exactly the needed capacity
   full.reserve(full_.size() + std::min(kBlocksOfNewBrick * more, next_.size() / kUnpackBelow));
   full.assign(full_.begin(), full_.end());
   full_ = std::move(full);
@@ -132,7 +132,7 @@ inline bool VoxelLayer::move_within(std::uint32_t number, Block& block, std::uin
   }
   std::size_t n = bits_in(others & (from_bit - 1));
   if (block.links[n] != number) return false;
-  // Only links of cells between the two move. There are none if the cells are neighbours along x.
+  // Only the links of the cells between `from` and `to` shift. Neighbours along x have no cell between them.
   if (to > from) {
     for (std::uint64_t bits = others & (to_bit - from_bit); bits != 0; bits &= bits - 1, ++n)
       block.links[n] = block.links[n + 1];

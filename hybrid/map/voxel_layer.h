@@ -66,7 +66,7 @@ class VoxelLayer {
     std::uint64_t occupied = 0;  // bit x + 4 y + 16 z of occupied cells
     std::uint32_t brick = kNone;
     std::array<std::uint32_t, kPacked> links;  // one per occupied cell; the rest is undefined
-    Block() noexcept {}                        // NOLINT: links stay uninitialised, a cache line not written
+    Block() noexcept {}                        // NOLINT: links stay uninitialised, to save a cache line
     void start(const CellCoordinates& block) noexcept {
       at = block;
       full = kNone;

@@ -235,7 +235,7 @@ void check_point_tool(const SceneSource& source, const Scene& scene, SourcePlace
                 words("give it a radius of about two spacings of \"", scene.soft.front().name, "\""));
 }
 
-// `materials`: all materials could be read, so that a missing one is an error of its own.
+// `materials`: true if all materials could be read; only then a material that is missing is an error.
 void read_soft_object(const SceneSource& source, const TreeNode& table, bool materials, Scene& scene) {
   scene.soft.push_back(read_soft(source, table, scene.soft.size() + 1));
   const SoftDescription& soft = scene.soft.back();
@@ -346,7 +346,7 @@ SceneError::SceneError(const std::filesystem::path& file, SourcePlace place,
 
 std::size_t max_lattice_voxels() {
   const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-  // If the system does not report its memory, assume that of the smallest machine of today.
+  // If the system does not report its memory, assumes 4 GiB, as in the smallest machines of today.
   const double bytes = pages > 0 && page_bytes > 0
                            ? static_cast<double>(pages) * static_cast<double>(page_bytes)
                            : 4.0 * 1024 * 1024 * 1024;

@@ -73,7 +73,7 @@ struct PlanePrimitive {
 struct CapsulePrimitive {
   double radius_m = 0.0, length_m = 0.0;  // length: between the two centres
 };
-struct CutPlane {  // the half-space that the normal points into is cut away, in the scene frame
+struct CutPlane {  // cuts away the half-space that the normal points into; scene frame
   glm::dvec3 normal{0.0, 0.0, 1.0};
   double offset_m = 0.0;
 };
@@ -96,7 +96,7 @@ using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlaneP
 struct SpinDescription {           // rotation about an axis that follows the path
   glm::dvec3 axis{0.0, 0.0, 1.0};  // unit vector, scene frame
   glm::dvec3 about_m{0.0};         // a point of the axis at the start, scene frame
-  double rate_rad_per_s = 0.0;     // endless rotation, if amplitude_rad is 0
+  double rate_rad_per_s = 0.0;     // rate of endless rotation; without effect unless amplitude_rad is 0
   double amplitude_rad = 0.0, frequency_hz = 0.0;
 };
 struct PathMotion {
@@ -190,7 +190,7 @@ struct SoftDescription {
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
   SourcePlace budget_place{};     // of the key; line 0: the default
   std::optional<Thinning> thinning{};
-  Energy energy = Energy::six_link;  // for materials without their own
+  Energy energy = Energy::six_link;  // energy of materials that state none
   // As in the file. load_scene() moves objects that are felt through the proxy to Scene::rigid, so all that
   // stay in Scene::soft are felt through their voxels.
   SoftModel model = SoftModel::voxels;
@@ -252,9 +252,9 @@ struct Scene {
   bool passivity = false;
 };
 
-// Largest number of voxels in a soft object's lattice that fits into this machine's physical memory. Building
-// a lattice takes up to lattice_bytes_per_voxel for each voxel of the bounding box (labels, surface and
-// temporary copies; 2.6 bytes with 512³ voxels).
+// Building a lattice takes up to lattice_bytes_per_voxel for each voxel of the bounding box (labels, surface
+// and temporary copies; 2.6 bytes with 512³ voxels). max_lattice_voxels() is the largest number of voxels for
+// which this fits into the machine's physical memory.
 inline constexpr std::size_t lattice_bytes_per_voxel = 4;
 std::size_t max_lattice_voxels();
 

@@ -12,7 +12,7 @@
 namespace hybrid {
 namespace {
 
-// Sizes between an atom and a planet, so that a product of three stays within the range of a double.
+// Far beyond any scene. The product of three such lengths stays within the range of a double.
 constexpr double largest_length_m = 1e9;
 
 constexpr std::string_view unit_names[] = {"m", "cm", "mm", "um"};

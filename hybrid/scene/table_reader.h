@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads the keys of one table of a scene file: types, units, bounds and unknown keys. Every refusal names its
-// place. If errors are gathered, a wrong number, text or file is kept as an error and replaced by some valid
-// value, so that all keys of a table are checked. A violated rule among several keys is an error only if
-// nothing else is wrong in the table.
+// place. If errors are gathered, reading goes on after a wrong number, text or file: the error is listed and
+// some valid value stands in, so that all keys of a table are checked. A violated rule among several keys is
+// an error only if nothing else is wrong in the table.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ struct Quantity {
   double lower = 0.0, upper = 0.0;
 };
 
-// An error after which reading can go on to find others.
+// An error after which reading can go on, to find further errors.
 struct ReaderError : SceneError {
   ReaderError(const std::filesystem::path& file, SourcePlace where, const std::string& what_and_remedy)
       : SceneError(file, where, what_and_remedy), place(where), text(what_and_remedy) {}
@@ -102,7 +102,7 @@ class TableReader {
   [[nodiscard]] const SceneSource& source() const { return source_; }
   [[noreturn]] void refuse(std::string_view key, const std::string& what, const std::string& remedy) const;
 
-  // Each of these returns its fallback if the key is absent; without a fallback the key is required.
+  // Each of the following returns its fallback if the key is absent. Without a fallback the key is required.
   [[nodiscard]] double number(std::string_view key, const Quantity& quantity,
                               std::optional<double> fallback = {}) const;
   [[nodiscard]] glm::dvec3 vector(std::string_view key, const Quantity& quantity,

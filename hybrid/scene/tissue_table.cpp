@@ -18,7 +18,7 @@ constexpr Tissue bone(std::string_view name, std::string_view patterns) {
 
 constexpr std::array kTissues{
     // clang-format off
-    // These come before the bones, whose patterns also fit them.
+    // These rows come before those of bones, because the patterns of bones also fit these names.
     Tissue{"cartilage", "*cartilage* *menisc* *disc *intervertebral*", false, 7.0e5, 0.10, true,
            "human femoral condyle, aggregate modulus 0.70 MPa, Athanasiou et al. 1991, J Orthop Res 9:330", {0.76F, 0.86F, 0.90F}},
     Tissue{"spinal cord", "*spinal_cord* *spinal?cord* *medulla_spinalis*", false, 2.5e3, 0.45, false,

@@ -13,10 +13,10 @@ namespace hybrid {
 struct Tissue {
   std::string_view name;      // of the tissue family and of its material in a scene: "rib", "liver"
   std::string_view patterns;  // of label names, separated by spaces; '*' and '?' stand for any characters
-  bool bone = false;          // felt as a rigid surface; the figures below are then not used
+  bool bone = false;          // true: felt as a rigid surface, without use of the figures below
   double young_Pa = 0.0;
   double poisson = 0.0;
-  bool measured = false;    // figures of this tissue; false: stand-ins, which `source` explains
+  bool measured = false;    // true: figures of this tissue; false: stand-ins, which `source` explains
   std::string_view source;  // where the figures are from
   glm::vec3 colour{0.0F};   // colour of the tissue in pictures; sRGB, 0 to 1
 };

@@ -15,8 +15,8 @@ bool is_blank(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-// Skips strings and comments as TOML 1.0 delimits them, and examines the rest. If the text is no valid TOML
-// the scan may differ from the parser's, but only after the place where the parser stops.
+// Skips strings and comments as TOML 1.0 delimits them, and examines the rest. If the text is no valid TOML,
+// this scan may differ from the parser's, but only after the place where the parser stops.
 class Screen {
  public:
   Screen(std::string_view text, const std::filesystem::path& file) : text_(text), file_(file) {}
@@ -133,8 +133,8 @@ std::size_t first_not_utf8(std::string_view text) {
   return text.size();
 }
 
-// Text is taken for Latin-1 if it has no byte from 0x80 to 0x9F: Latin-1 has a letter or sign for every byte
-// from 0xA0 on, and none for those.
+// Text that is not UTF-8 is taken for Latin-1 if it has no byte from 0x80 to 0x9F. In Latin-1 these bytes
+// stand for no letter or sign, but every byte from 0xA0 on does.
 [[noreturn]] void refuse_encoding(std::string_view text, std::size_t at, const std::filesystem::path& file) {
   const bool latin = std::all_of(text.begin(), text.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);

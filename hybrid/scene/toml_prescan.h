@@ -19,8 +19,8 @@ SourcePlace place_in_text(std::string_view text, std::size_t at);
 
 // Throws SceneError if the text is empty, too large, UTF-16, Latin-1 or otherwise not UTF-8. It also throws
 // if the text contains a zero byte, too many values, a key of too many parts, or non-ASCII characters outside
-// strings and comments. No key of a scene has non-ASCII characters. They cause undefined behaviour in toml++
-// 3.3, whose test for Unicode white space ends in __builtin_unreachable().
+// strings and comments. No key of a scene needs such characters. In toml++ 3.3 they cause undefined
+// behaviour: its test for Unicode white space ends in __builtin_unreachable().
 void prescan_scene_text(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace hybrid

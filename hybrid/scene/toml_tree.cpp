@@ -10,9 +10,9 @@
 #include "hybrid/base/number_text.h"
 #include "hybrid/scene/toml_prescan.h"
 
-// On some malformed files (for example with a header "[=") an assertion of toml++ 3.3 fails instead of an
-// error being reported. Without assertions its behaviour is undefined. Here a failed assertion becomes an
-// error of the file.
+// On some malformed files (for example with a header "[=") toml++ 3.3 fails an assertion instead of reporting
+// an error. Without assertions its behaviour is then undefined. Here a failed assertion becomes an error of
+// the file.
 namespace {
 struct ParserGaveUp {};
 [[noreturn]] void give_up() {
@@ -102,7 +102,7 @@ bool parser_gives_up(std::string_view text) {
   return false;
 }
 
-// The parser reads from front to back, so the shortest prefix of the text on which it gives up ends at the
+// The parser reads from front to back. So the shortest prefix of the text that the parser rejects ends at the
 // error.
 SourcePlace where_parser_gives_up(std::string_view text) {
   std::size_t good = 0, bad = text.size();

@@ -37,7 +37,7 @@ struct TreeEntry {
 // The entry of a table with this key; null: there is none.
 const TreeEntry* entry_of(const TreeNode& table, std::string_view key);
 
-// Byte of a file's text at a place, at most its size. Columns count code points.
+// Offset in bytes of a place in a file's text, at most the text's size. Columns count code points.
 std::size_t byte_at(std::string_view text, SourcePlace place);
 
 // The kind of a value for a message: "a string", "a table", ...
@@ -73,7 +73,7 @@ std::string words(const Parts&... parts) {
 // Reads and parses a file. Throws SceneError: missing, a folder, too large, empty, not UTF-8, not TOML.
 TreeNode read_tree(const std::filesystem::path& file);
 
-// The same for text in memory; `file` is used in messages only.
+// Parses text in memory, with the same errors as read_tree(). `file` is used in messages only.
 TreeNode parse_tree(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace hybrid

@@ -7,8 +7,8 @@
 
 namespace hybrid {
 
-// Lists them in Scene::unused_keys, each with the reason. `root` is the whole file, from which `scene` was
-// read without an error.
+// Lists these keys in Scene::unused_keys, each with the reason. `root` is the whole file, from which `scene`
+// was read without an error.
 void note_unused_keys(const TableReader& root, Scene& scene);
 
 }  // namespace hybrid

@@ -9,8 +9,8 @@ namespace hybrid {
 
 // Fills the places of everything that moves. Allocates nothing once the vectors have their sizes.
 void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot);
-// Does the same within a tick that must not wait. A soft object on nested patches gets only their nodes, and
-// one under asynchronous relaxation only the neighbourhood of the tool.
+// Like fill_moved(), but for use within a tick that must not wait. A soft object on nested patches gets only
+// the patches' nodes. A soft object under asynchronous relaxation gets only the neighbourhood of the tool.
 void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot);
 // Fills the present values of DrawnScene::editable. Allocates nothing once `values` has its size.
 void fill_values(const World& world, const WorldState& state, const DrawnScene& drawn, Snapshot& snapshot);

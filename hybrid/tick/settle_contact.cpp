@@ -16,7 +16,7 @@ namespace hybrid {
 namespace {
 
 struct ContactSettings {
-  int passes = 3;           // most passes in a tick; in each the proxy moves and then the tissue
+  int passes = 3;           // maximum number of passes in a tick; in each the proxy moves, then the tissue
   int sweeps = 1;           // relaxations of the contact's neighbourhood in each pass
   double soft_step = 0.25;  // longest step of the proxy against tissue in one pass (unit: the tool's reach)
   double arrived = 1e-2;    // a later pass that moves the proxy less is the last (unit: the tool's radius)
@@ -208,8 +208,8 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
       minimise_outside_rigid(world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)), [&] {
         bounds = tool_bounds(world, state, state.proxy_m, false, kSettings.soft_step, state.scratch.planes);
       });
-  // Notes the planes that stop the tool. Then moves the tool to the exit, or else back to the start of the
-  // tick, unless it was deeper there.
+  // Notes the planes that stop the tool. Then moves the tool to the exit. Without a sure exit, moves the tool
+  // back to the start of the tick, unless it was deeper there.
   for (std::size_t i = least.rigid; i < state.scratch.planes.size(); ++i) {
     if (state.scratch.planes[i].offset > glm::dot(state.scratch.planes[i].normal, state.proxy_m))
       add_stop(state, state.scratch.planes[i]);

@@ -25,8 +25,9 @@ struct Neighbourhood {
 Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& device,
                      const Neighbourhood& around) noexcept;
 
-// If anchors, bone or its own chain keep tissue from leaving the tool's way, the tool leaves instead: to the
-// nearest place outside the tissue's bounds, or else back to `before`, its place at the start of the tick.
+// If tissue cannot leave the tool's way (because of anchors, bone or its own chain), the tool moves instead.
+// It moves to the nearest place outside the tissue's bounds, or else back to `before`, its place at the start
+// of the tick.
 void give_way(const World& world, WorldState& state, const glm::dvec3& before, Sweep& sweep) noexcept;
 
 }  // namespace hybrid

@@ -168,8 +168,8 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   refresh_obstacles(world, state);
   clock.done(Stage::contact);
 
-  // Soft objects that meet may push one another back into the tool's way, so the tool gives way after them.
-  // If no soft objects can meet, tissue relaxes after the tool gave way.
+  // Soft objects that meet may push one another back into the tool's way. So the tool gives way after their
+  // contacts are solved. If no soft objects can meet, tissue relaxes after the tool gave way.
   const bool may_meet = !world.soft_pairs.empty();
   if (may_meet) {
     relax_tissue(world, state, clock);

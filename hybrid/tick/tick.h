@@ -10,7 +10,8 @@
 
 namespace hybrid {
 
-// Stages, in the order in which haptic_tick() calls them.
+// Stages of haptic_tick(), in the order of calls if soft objects can meet. Otherwise background is called
+// after arbitration.
 enum class Stage : std::uint8_t {
   bodies,       // bodies move, and carry or push the proxy
   broad_phase,  // finds what the occupancy map has around the proxy
@@ -39,8 +40,8 @@ struct TickResult {
 // One tick of `given_dt_s`. Except for measured times, it is a pure function of world, state, input and
 // given_dt_s: the same inputs give the same bits. Never allocates, locks, throws or does I/O; every loop is
 // bounded. Any input is accepted. A position that is not finite or beyond 1e12 m is replaced by the last
-// valid one (fault_nonfinite_input). A negative or non-finite given_dt_s is treated as 0: no time passes. One
-// longer than a day is shortened to a day.
+// valid one (fault_nonfinite_input). If given_dt_s is negative or not finite, no time passes. If it is longer
+// than a day, it is shortened to a day.
 TickResult haptic_tick(const World& world, WorldState& state, const device::DeviceState& input,
                        double given_dt_s) noexcept;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// State of asynchronous relaxation. Tissue away from the contact is then relaxed outside the tick, in a copy
-// of the soft object (voxel/object/shadow_object.h). The tick's part is in
-// hybrid/tick/tissue/async_relaxation.h, the thread's in hybrid/session/relaxation_thread.h.
+// State of asynchronous relaxation: tissue away from the contact is relaxed outside the tick, in a copy of
+// the soft object (voxel/object/shadow_object.h). The tick's part is in
+// hybrid/tick/tissue/async_relaxation.h. The thread's part is in hybrid/session/relaxation_thread.h.
 //
 // The tick submits displacements and applies results; it never waits. Only the time at which a result is
 // ready depends on the machine. The tick that first applies a result is therefore recorded, and a replayed
@@ -22,8 +22,8 @@ namespace hybrid {
 enum class Arrival : std::uint8_t {
   counted,   // relaxed at once; applied after a delay in proportion to its work; for fixed-step sessions
   thread,    // relaxed by the thread; applied when it is done
-  recorded,  // relaxed at once; applied in the tick that `arrived` names
-  played,    // not relaxed: another thread installs recorded results; `arrived` names the tick
+  recorded,  // relaxed at once; applied in the tick whose recorded `arrived` has the object's bit
+  played,    // not relaxed, because another thread installs recorded results; applied as `recorded` is
 };
 
 // The copy (shadow) of one soft object. `phase` says who may use the copy now, the tick or the thread.

@@ -17,8 +17,8 @@ namespace hybrid {
 struct BodyQuery {
   glm::vec3 u{0.0F};      // displacement of the voxel at the query (m)
   bool given_up = false;  // the voxel is deep in the body, and is left alone until it is outside
-  // No query is needed before the body's travel since the session began, plus the voxel's motion since the
-  // last query, reaches this value (m).
+  // The next query is due when the following sum reaches this value (m): the body's travel since the session
+  // began plus the voxel's motion since the last query.
   double until_m = 0.0;
 };
 
@@ -53,8 +53,8 @@ struct BodyPair {
   std::uint32_t free = 0, other = 0;
   double size_m = 0.0, skin_m = 0.0;  // smaller object's diagonal; gap kept between surfaces
   double friction = 0.0;              // Coulomb's coefficient
-  // Values of the sum of both objects' travel. The objects cannot touch before it reaches `until_m`. At the
-  // last query it was `queried_at_m`.
+  // Two values of the sum of both objects' travel (m). Before the sum reaches `until_m` the objects cannot
+  // touch. At the last query the sum was `queried_at_m`.
   double until_m = -1e300, queried_at_m = -1e300;
   std::array<std::vector<PointQuery>, 2> queries;  // of the points of `free`, then of those of `other`
 };

@@ -29,7 +29,7 @@ struct Weighed {
 
 struct Edge {
   std::uint32_t low, high, triangle;
-  double sharpness = 0.0;  // 1 − cosine of the angle between its faces' normals; 2 if it has not two faces
+  double sharpness = 0.0;  // 1 − cosine of the angle between its faces' normals; 2 unless it has two faces
   bool operator<(const Edge& other) const {
     return std::tie(low, high, triangle) < std::tie(other.low, other.high, other.triangle);
   }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Points that represent the surface of a rigid object in contacts with other rigid objects.
 //
-// Objects A and B can overlap only between points if all points of A are outside B and all points of B are
-// outside A. The error is zero for a ball (one point: its centre, with its radius), and where a corner or a
-// face touches anything. Where two edges cross, the error is up to half the distance between points. Points
-// on edges therefore slide to the crossing. Points are needed where a surface is not flat: at vertices and
-// along sharp edges. Faces need none inside.
+// If all points of object A are outside object B, and all points of B are outside A, the two can still
+// overlap between points. This error is zero for a ball (one point: its centre, with its radius), and where a
+// corner or a face touches anything. Where two edges cross, the overlap is up to half the distance between
+// points. Therefore points on edges slide to the crossing. Points are needed where a surface is not flat: at
+// vertices and along sharp edges. The inside of a face needs none.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ namespace hybrid {
 struct SurfacePoint {
   glm::dvec3 at_m{0.0};   // body frame
   double radius_m = 0.0;  // a ball of this radius is part of the object
-  // Indices of the points at the two ends of the point's edge, which are earlier in the list. The points of
+  // Indices of the points at the two ends of this point's edge. Both are earlier in the list. The points of
   // one edge are consecutive and in order. The point may slide by `reach_m` in either direction `along` the
   // edge.
   std::array<std::uint32_t, 2> ends{};
@@ -34,8 +34,8 @@ struct SurfacePoint {
 inline constexpr std::size_t kMostSurfacePoints = 800;
 
 // Points of an object whose surface is `shape` (body frame): the centre of a ball, points on the axis of a
-// capsule, and otherwise the shape's vertices and points along its sharp edges. If these are more than
-// kMostSurfacePoints, only the sharpest point of each cell of a grid is kept. Cells grow until few enough
+// capsule, and otherwise the shape's vertices and points along its sharp edges. If there are more than
+// kMostSurfacePoints, only the sharpest point of each cell of a grid is kept. The cells grow until few enough
 // points are left. Deterministic.
 [[nodiscard]] std::vector<SurfacePoint> surface_points(const RigidSource& source,
                                                        const polygon::TriangleMesh& shape);

@@ -68,10 +68,10 @@ bool apply_edit(const World& world, WorldState& state, const Edit& edit) noexcep
 void apply_edits_of_tick(const World& world, WorldState& state, std::span<const Edit> edits,
                          std::uint64_t tick, std::size_t& next) noexcept;
 
-// "stiffness", "static-friction", …, as scripts name the quantities, and their units as people write them.
+// Name of a quantity in scripts ("stiffness", "static-friction", …), and the unit in which people write it.
 [[nodiscard]] std::string_view name_of(EditedQuantity quantity) noexcept;
 [[nodiscard]] std::string_view unit_of(EditedQuantity quantity) noexcept;
-// SI value of one such unit.
+// SI value of one unit_of(quantity).
 [[nodiscard]] double si_of_unit(EditedQuantity quantity) noexcept;
 [[nodiscard]] std::optional<EditedQuantity> quantity_named(std::string_view name) noexcept;
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One step of free rigid bodies under contacts that may be far stiffer than explicit integration allows.
 //
-// Linearly implicit Euler (Baraff & Witkin 1998, section 3): contact forces depend on the velocity at the end
-// of the step, (M + dt·D + dt²·Σ k·JᵀJ) v = M·v₀ + dt·f, so that the step is stable for every stiffness, mass
-// and dt. A contact that would have to pull is released. Bodies that touch one another are solved together.
-// The torque-free rotation is a separate step: the implicit midpoint rule with a Cayley rotation (Lewis &
-// Simo 1994), which keeps angular momentum and energy to rounding.
+// Linearly implicit Euler (Baraff & Witkin 1998, section 3): contact forces are those at the velocity v at
+// the end of the step, which solves (M + dt·D + dt²·Σ k·JᵀJ) v = M·v₀ + dt·f. So the step is stable for every
+// stiffness, mass and dt. A contact that would have to pull is released. Bodies that touch one another are
+// solved together. The torque-free rotation is a separate step: the implicit midpoint rule with a Cayley
+// rotation (Lewis & Simo 1994), which keeps angular momentum and energy to rounding.
 #pragma once
 
 #include <array>
@@ -44,10 +44,11 @@ FreeBody without_external_loads(const FreeBody& body) noexcept;
 FreeBodyState state_at(const FreeBody& body, const Pose& pose);
 Pose pose_of(const FreeBody& body, const FreeBodyState& state) noexcept;
 
-// A contact force on the body along `normal` (unit; the direction in which the contact pushes the body). It
-// is `force_N` at the start of the step, and falls by `stiffness_N_per_m` (>= 0) for each meter that
-// `point_m` moves along `normal`. A damper b (N s/m) adds b/dt to the stiffness and b · approach speed to the
-// force. If `other` is a free body, it takes the opposite force. `friction` is Coulomb's coefficient.
+// A contact force on the body along `normal` (unit; the direction in which the contact pushes the body). The
+// force is `force_N` at the start of the step. It falls by `stiffness_N_per_m` (>= 0) for each meter that
+// `point_m` moves along `normal`. A damper b (N s/m) is modelled by b/dt more stiffness and b · approach
+// speed more force. If `other` is a free body, it takes the opposite force. `friction` is Coulomb's
+// coefficient.
 struct BodyContact {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
@@ -93,13 +94,13 @@ class BodySystem {
   std::vector<ContactOnLine> lines_;
 };
 
-// Advances the bodies by dt_s, but only the first system.most_bodies() of them. Bounded, allocates nothing. A
-// body without contact to others gets the result that it would get alone.
+// Advances the first system.most_bodies() of the bodies by dt_s; further bodies are left as they are.
+// Bounded, allocates nothing. A body without contact to others gets the same result as alone.
 void step_free_bodies(std::span<SteppedBody> bodies, std::span<const BodyContact> contacts,
                       BodySystem& system, double dt_s) noexcept;
 
-// Does the same for one body. Pure, bounded, allocates nothing. False if the result would not be finite
-// because an input was not. The body then stands still where it was.
+// Advances one body by dt_s under its contacts. Pure, bounded, allocates nothing. Returns false if the result
+// would not be finite because an input was not. The body then stands still where it was.
 bool step_free_body(const FreeBody& body, FreeBodyState& state, std::span<const BodyContact> contacts,
                     double dt_s) noexcept;
 

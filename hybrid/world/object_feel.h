@@ -9,7 +9,7 @@ namespace hybrid {
 struct ObjectFeel {
   bool contact = false;
   double force_N = 0.0;       // length of on_hand_N
-  glm::dvec3 on_hand_N{0.0};  // scene frame; summed over all objects: the felt force before its limits
+  glm::dvec3 on_hand_N{0.0};  // scene frame; the sum over all objects is the felt force before its limits
 };
 
 }  // namespace hybrid

@@ -16,7 +16,7 @@ constexpr int kMaxFrictionSolves = 16;  // Newton steps with friction
 constexpr double kStickSpeed = 1e-5;    // m/s: regularises Coulomb's law; slower sliding counts as sticking
 constexpr double kSlipTolerance = 0.01, kForceTolerance = 0.1;  // relative tolerances of slip and pressure
 constexpr int kHalvings = 40;
-constexpr double kFlatEnough = 0.1;  // the line search ends where the slope is this fraction of the first
+constexpr double kFlatEnough = 0.1;  // the line search ends at this fraction of the initial slope
 
 double dot(const Twist& a, const Twist& b) noexcept {
   return glm::dot(a.linear, b.linear) + glm::dot(a.angular, b.angular);
@@ -111,11 +111,11 @@ class ContactSolver {
         std::any_of(contacts.begin(), contacts.end(), [](const BodyContact& c) { return c.friction > 0.0; });
   }
 
-  // False if the velocities would not be finite. The energy is convex in the velocities: the sum of a
-  // quadratic, the energy of unilateral contacts, and dissipation by friction. The method is a semi-smooth
-  // Newton method. Each step is shortened by a line search to where the energy no longer falls, so the method
-  // cannot cycle. If the iterations run out, contacts may pull a little. Friction bounds use the normal
-  // forces of the previous solution.
+  // Returns false if the velocities would not be finite. A semi-smooth Newton method minimises an energy that
+  // is convex in the velocities: the sum of a quadratic, the energy of unilateral contacts, and the
+  // dissipation by friction. A line search shortens each step to where the energy no longer falls, so the
+  // method cannot cycle. Friction bounds use the normal forces of the previous solution. If the iterations
+  // run out, contacts may pull a little.
   bool solve() noexcept {
     std::fill(x_.begin(), x_.end(), 0.0);
     for (std::size_t c = 0; c < one_sided_; ++c) active_[c] = !(contacts_[c].force_N < 0.0);
@@ -252,7 +252,7 @@ class ContactSolver {
     for (std::size_t i = 0; i < x_.size(); ++i) x_[i] = before_[i] + share * (x_[i] - before_[i]);
   }
   // Line search: the fraction of the way from `before_` to `x_` up to which the energy falls. The slope grows
-  // monotonically, because the energy is convex. The part of the normal forces is piecewise linear.
+  // monotonically, because the energy is convex. The normal forces' part of the slope is piecewise linear.
   [[nodiscard]] double line_search(bool with_friction) noexcept {
     double slope = 0.0, curvature = 0.0;  // without the contacts, at before_
     for (std::uint32_t b = 0; b < bodies_.size(); ++b) {

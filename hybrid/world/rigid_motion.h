@@ -28,8 +28,8 @@ class RigidMotion {
   [[nodiscard]] bool moves() const noexcept { return kind_ != Kind::fixed; }
   [[nodiscard]] const Pose& start() const noexcept { return start_; }
 
-  // The pose at simulated time `t_s` (s). It is exactly start() at time 0, and always if the motion is not a
-  // path. Pure, allocates nothing.
+  // The pose at simulated time `t_s` (s). At time 0 it is exactly start(); without a path it is start() at
+  // any time. Pure, allocates nothing.
   [[nodiscard]] Pose pose_at(double t_s) const noexcept;
   // Time until the path ends; infinite for a spin, 0 without a path.
   [[nodiscard]] double duration_s() const noexcept;
@@ -37,7 +37,7 @@ class RigidMotion {
   // Bound on the straight distance that any point of the object moves between the two poses (m).
   [[nodiscard]] double displacement_bound(const Pose& before, const Pose& after) const noexcept;
 
-  // For Kind::free.
+  // Only for Kind::free.
   [[nodiscard]] const FreeBody& free_body() const noexcept { return free_; }
 
  private:

@@ -21,7 +21,7 @@ struct ProxyPlane {
   std::uint32_t object = 0, element = 0;
   polygon::SeparatingPlane in_body;
   bool own_plane = true;  // the element's own plane may be used
-  bool flat = false;      // the element's plane is `in_body` from every viewpoint
+  bool flat = false;      // the element's own plane is `in_body`, wherever the proxy is
   bool touching = false;  // the proxy is known to lie on it at the end of the last sweep
 };
 inline constexpr std::uint32_t kMaxProxyPlanes = 32;
@@ -73,10 +73,10 @@ struct TickScratch {
   std::vector<DueQuery> due;
   std::vector<std::uint32_t> in_the_way;            // surface voxels inside a body
   std::vector<BodyContact> body_contacts;           // all contacts of free bodies
-  FreeBodyStep free_bodies;                         // free bodies that they act on
+  FreeBodyStep free_bodies;                         // free bodies on which these contacts act
   std::vector<std::uint32_t> body_surface_numbers;  // surface voxels of one object that press on a free body
-  std::vector<voxel::VoxelId> body_voxels;          // their voxels
-  std::vector<voxel::ContactLoad> body_loads;       // their loads
+  std::vector<voxel::VoxelId> body_voxels;          // voxels with these surface numbers
+  std::vector<voxel::ContactLoad> body_loads;       // loads of these voxels
 };
 
 }  // namespace hybrid

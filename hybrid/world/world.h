@@ -55,7 +55,7 @@ struct RigidObject {
 struct SoftBody {  // the constant half of a soft object; WorldState::soft is the other one
   std::string name;
   voxel::BodyPose pose;                               // volume frame to scene
-  std::uint32_t first_number = 0;                     // of its first surface voxel in the occupancy map
+  std::uint32_t first_number = 0;                     // its first surface voxel's number in the occupancy map
   std::uint32_t budget = 0;                           // background voxel updates a tick
   polygon::TriangleMesh drawn;                        // volume frame, at rest
   std::size_t thinned = 0;                            // voxels that thinning left out

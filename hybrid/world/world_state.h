@@ -27,7 +27,7 @@
 
 namespace hybrid {
 
-// A surface voxel of one soft object over a facet of another one's surface.
+// A surface voxel of one soft object that lies over a facet of another soft object's surface.
 struct FacetContact {
   std::uint32_t soft_pair = 0;  // index into World::soft_pairs
   voxel::PressedPair pressed;   // the facet that the voxel is over
@@ -38,7 +38,7 @@ struct FacetContact {
   bool held = false;  // near enough to press: only the contact moves its voxels
 };
 
-// Named faults of a tick; the report says each in words, with the setting to raise where there is one.
+// Faults of a tick. The report describes each in words, and names the setting to raise if there is one.
 enum FaultBit : std::uint32_t {
   fault_nonfinite_input = 1,  // the device gave a position that is not finite: the last valid one was used
   // More soft voxels near the tool than SoftObject::kMaxTouched: use a smaller tool or coarser voxels.
@@ -62,7 +62,7 @@ inline constexpr std::size_t kMaxMapHits = 32768;  // map entries read in one lo
 // Per rigid object: its pose, and the separating planes cached around the proxy.
 struct RigidState {
   BodyFrame frame;               // the present pose
-  Pose pose;                     // the same as position and quaternion
+  Pose pose;                     // the same pose with a quaternion instead of a matrix
   FreeBodyState free;            // state, if the object is a free body
   Pose before;                   // pose before this tick, if the object presses tissue
   std::uint32_t rest_ticks = 0;  // consecutive ticks in which the object hardly moved
@@ -105,10 +105,10 @@ struct CarriedState {
   device::Clock clock;                // simulated time, on which the bodies' paths depend
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite
   std::uint32_t faults = 0;           // FaultBit, accumulated over the session
-  std::uint64_t truncated_ticks = 0;  // ticks in which a bound on the proxy's steps stopped it on its way
+  std::uint64_t truncated_ticks = 0;  // ticks in which the proxy stopped early, at a bound on its steps
 
   // ---- of the proxy ----
-  double learnt_stiffness_N_per_m = 0.0;  // stiffness of tissue beyond the model of its pressed voxels
+  double learnt_stiffness_N_per_m = 0.0;  // tissue stiffness in excess of the pressed voxels' model
   // Half-spaces of voxels that could not leave the tool's way when last pressed (scene frame).
   std::vector<polygon::ContactPlane> jammed;
   std::vector<RigidState> rigid;          // [rigid]
@@ -121,7 +121,7 @@ struct CarriedState {
   glm::dvec3 friction_N{0.0};  // force on the proxy that friction and shading add to the normal force
   std::uint32_t rubbed = 0;    // rigid object that exerts friction_N and carries the proxy
   DampingState damping;
-  // `look_mask`: the rigid objects that the map has within `look_m` of `look_at` along each axis.
+  // `look_mask`: the rigid objects that the map lists within `look_m` of `look_at` along each axis.
   glm::dvec3 look_at{0.0};
   double look_m = -1.0;
   std::uint64_t look_mask = 0;
@@ -135,7 +135,7 @@ struct CarriedState {
   std::vector<std::uint32_t> cursor, obstacle_cursor;          // [soft] next surface voxel to visit
   std::vector<std::uint32_t> pair_cursor;                      // [soft pair]
   std::vector<BodyObstacles> body_obstacles;                   // [soft]; empty where no body presses tissue
-  // For bodies that press tissue: bounds on the motion of any point since the session began, and in this
+  // For bodies that press tissue. Bounds on the motion of any point (m): since the session began, and in this
   // tick.
   std::vector<double> body_travel_m, body_moved_m;  // [rigid]
   BodyCollisions collisions;

@@ -12,9 +12,10 @@
 namespace hybrid {
 namespace {
 
-// Exact queries per tick and soft object. One takes 50 to 100 ns for a primitive and 1 to 2 µs for a mesh.
+// Exact queries per tick and soft object. A query takes 50 to 100 ns for a primitive and 1 to 2 µs for a
+// mesh.
 constexpr std::size_t kMaxSurfaceQueries = 3000, kMaxMeshQueries = 750;
-constexpr double kWatchedRange = 1.5;  // spacings: a voxel this near to a body has a half-space of it
+constexpr double kWatchedRange = 1.5;  // spacings: a voxel this near to a body gets a half-space from it
 constexpr double kQueryAhead = 8.0;    // spacings added to a query's range, so that the next is not due soon
 // Spacings: a voxel near a standing body is queried again after it moved this far.
 constexpr double kRequeryMotion = 0.02;
@@ -23,14 +24,14 @@ constexpr double kExitStep = 0.25;
 constexpr double kLiesOn = 1e-3;  // spacings: a voxel this near to the plane of its half-space lies on it
 // Spacings: a fixed surface this near gives the voxel its half-space, even if a body is nearer.
 constexpr double kNearFixed = 0.3;
-// Sine of the angle between body and bone. A narrower gap has no way out.
+// Sine of the smallest angle between body and bone at which a voxel has a way out.
 constexpr double kLeastGapSine = 0.4;
 constexpr double kNoWayOut = 0.5;     // spacings: a voxel that is deeper after the wave has no way out
 constexpr double kOnSurface = 1e-9;   // spacings: a point this near to a surface counts as on it
 constexpr double kLongestStep = 0.5;  // spacings: longest step of a body
 constexpr int kMaxSteps = 8;          // largest number of steps in a tick
 constexpr double kSqueezed = 0.05;    // spacings: a deeper overlap is a fault
-constexpr int kMaxRounds = 4;         // per step: rounds of a free body and tissue giving way
+constexpr int kMaxRounds = 4;         // per step: rounds in which free body and tissue give way in turn
 constexpr double kStopDepth = 0.25;   // spacings: a free body this deep in tissue stops
 
 bool is_set(const voxel::Obstacle& o) {
@@ -136,8 +137,8 @@ class TissueAtBodies {
     if (in_the_way.empty()) return;
     for (const std::uint32_t s : beside_.near) tolerate_depth(s);
     object_.leave_obstacles(in_the_way);
-    // Voxels that the wave moved into bone are moved out again, even where the bone is inside the body.
-    // Voxels whose depth in a body was tolerated leave by relaxation.
+    // Voxels that the wave moved into bone are moved out again, even where the bone is inside the body. A
+    // voxel whose depth in a body was tolerated leaves the body by relaxation.
     in_the_way.clear();
     for (const std::uint32_t s : beside_.near) {
       choose_obstacle(s);
@@ -233,15 +234,15 @@ class TissueAtBodies {
     }
     const glm::dvec3 wall(standing.normal), along = n - glm::dot(n, wall) * wall;
     const double part = glm::length(along);
-    if (part < kLeastGapSine) return false;  // no way out between the two
+    if (part < kLeastGapSine) return false;  // no way out between body and fixed surface
     object_.set_obstacle(
         s, {glm::vec3(along / part), static_cast<float>(glm::dot(along / part, u) + depth / part), true});
     return true;
   }
-  // Depth (m) by which a voxel may stay in a body. A jammed voxel cannot leave the body altogether, so the
-  // wave does not require it to. Otherwise the wave would pull neighbours of the voxel into the body, through
-  // links at their limits, and the neighbours would pull the voxel. Of two voxels that are pulled apart the
-  // wave favours one, so bodies would creep without end.
+  // Depth (m) by which a voxel may stay in a body. A jammed voxel cannot leave the body altogether, and the
+  // wave must not require it. Otherwise the wave would pull neighbours of the voxel into the body, through
+  // links at their limits, and the neighbours would pull the voxel out. Of two voxels that are pulled apart
+  // the wave favours one, so bodies would creep without end.
   [[nodiscard]] double tolerated_depth_m(std::uint32_t s) const noexcept {
     return beside_.jammed[s] != 0 ? kJammedProbe * spacing_m_ : 0.0;
   }
@@ -362,7 +363,7 @@ void press_once(const World& world, WorldState& state, const Moment& moment) noe
 }
 
 // If tissue could not leave a free body's way, the body gives way. The body may turn, and other tissue may
-// then have to leave its way, so the two alternate.
+// then have to leave its way. So body and tissue give way in turn.
 void stop_in_tissue(const World& world, WorldState& state, std::uint32_t b, const Moment& moment,
                     double dt_s) noexcept {
   Pose pose = pose_at(world, state, b, moment);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tissue leaves the way of rigid bodies that move, and returns when they leave. tissue_supports_bodies.h has
-// the forces on free bodies.
+// Tissue leaves the way of rigid bodies that move, and returns when they leave. For the forces on free bodies
+// see tissue_supports_bodies.h.
 //
-// A surface voxel near such a body has a half-space as its obstacle, as a voxel near bone has. It is the
-// outside of the plane through the body's nearest point, and is made anew in every tick in which voxel or
-// body moved. Voxels inside the body leave along the normal. One wave of the chain moves all of them, and
+// A surface voxel near such a body has a half-space as its obstacle, as a voxel near bone has. The half-space
+// is the outside of the plane through the body's nearest point. It is made anew in every tick in which voxel
+// or body moved. Voxels inside the body leave along the normal. One wave of the chain moves all of them, and
 // relaxation does the rest. A voxel has one half-space: that of the nearer of body and bone, or that of the
 // bone if the voxel is inside both.
 //

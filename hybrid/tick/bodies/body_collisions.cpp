@@ -26,7 +26,7 @@ constexpr double kSlideRange = 0.05;
 constexpr double kLeastSlide = 0.01;  // shorter slides are skipped (unit: the point's reach)
 constexpr double kStride = 0.02;      // step along a way (unit: the smaller object's diagonal)
 constexpr int kMostStrides = 32;
-constexpr int kRounds = 6;                           // most repetitions of solving and following ways
+constexpr int kRounds = 6;                           // maximum repetitions of solving and following ways
 constexpr std::size_t kMaxCollisionQueries = 20000;  // exact queries a tick
 // Range within which a body that gives way is stopped (unit: the smaller object's diagonal).
 constexpr double kStopRange = 0.05;
@@ -44,7 +44,7 @@ class Collisions : private CollisionQueries {
       place_after();
       if (follow_ways(round)) break;
       if (round < kRounds) continue;
-      ++all_.round;  // voids queries made on ways: bodies that stand still did not go there
+      ++all_.round;  // voids queries made on ways, because bodies that stand still did not go there
       place_after();
       break;
     }
@@ -227,8 +227,8 @@ class Collisions : private CollisionQueries {
                             before.gap_m < ahead ? ahead : 0.0);
       queried = true;
       if (met.gap_m < allowed) {
-        // At a thin object or at an edge, the way's start may not be in front of this surface. Then the
-        // surface of the previous query counts.
+        // At a thin object or at an edge, the start of the way may not be in front of the surface found here.
+        // The surface of the previous query then counts.
         if (in_front(met, from, p) < pair.skin_m) met = before;
         return false;
       }
@@ -236,8 +236,8 @@ class Collisions : private CollisionQueries {
     }
     return true;
   }
-  // Adds a contact with the half-space that a point met on its way. The gap is the one at the end of the way
-  // in the last solution, less the free bodies' motion in that solution.
+  // Adds a contact with the half-space that a point met on its way. The contact's gap is the one that the
+  // last solution leaves at the end of the way, but without the free bodies' motion in that solution.
   void add_contact_on_way(BodyPair& pair, Side side, std::size_t i, const NearestSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const auto [from, to] = way_of(pair, side, i);
@@ -270,7 +270,8 @@ class Collisions : private CollisionQueries {
     stepped.velocity_m_per_s = stepped.spin_rad_per_s = glm::dvec3(0.0);
   }
 
-  // The next tick begins with the queries that were made at the ends of the ways.
+  // Keeps the poses and the queries at the ends of the ways for the next tick. Moves overlapping bodies
+  // apart.
   void finish() noexcept {
     commit_poses();
     bool overlaps = false;

@@ -13,7 +13,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxWaysAside = 8;  // most attempts to move the proxy aside when a body pushes it into another
+constexpr int kMaxWaysAside =
+    8;  // limit on attempts to move the proxy aside when a body pushes it into another
 // A body rests after kRestTicks ticks in which it moves no further than kRestMotion (spacings) and the change
 // of force and the unbalanced force stay below kRestForce of the load. A resting body wakes when it exceeds
 // kWakeFactor times these bounds.
@@ -112,7 +113,7 @@ void set_rigid_pose(const World& world, WorldState& state, std::uint32_t object,
 
 namespace {
 
-// Did a body that went from `before` to `after` (nearly) not move? `springs`: contacts of the tool and of
+// Is a body that went from `before` to `after` (nearly) at rest? `springs`: contacts of the tool and of
 // tissue's links.
 bool is_at_rest(const FreeBody& body, const FreeBodyState& before, const FreeBodyState& after,
                 std::span<const BodyContact> springs, double dt_s, double most) noexcept {

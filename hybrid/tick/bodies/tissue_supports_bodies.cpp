@@ -22,17 +22,17 @@ constexpr double kOnBody = 1e-3;     // spacings: a voxel this near to the body 
 // Regularises directions that the normals hardly span. Unit: trace of the sum of n nᵀ over the normals n.
 constexpr double kRegularisation = 1e-3;
 // Factor on the stiffness of links. The part beyond 1 acts as a damper. Under asynchronous relaxation tissue
-// is a spring between two results, and one result may return energy that tissue took up before another.
-// Without the damper bodies would hop.
+// acts as a spring between two results, and a result may return energy that tissue took up before an earlier
+// result. Without the damper bodies would hop.
 constexpr double kLinkDamping = 3.0;
-// The same factor for links at their limits. Their shares of a load change abruptly, which would make bodies
-// jitter.
+// Factor on the stiffness of links at their limits. Their shares of a load change abruptly, which would make
+// bodies jitter.
 constexpr double kLimitDamping = 20.0;
 constexpr double kMovableTissue = 1e-2;  // factor on the stiffness of stops at tissue that can still give way
 // Stiffness of stops: as good as rigid. Unit: mass / dt², which stops the body within a tick.
 constexpr double kStopStiffness = 1e4;
 
-// A surface voxel whose nearest body is the body in question.
+// Place of a surface voxel relative to the body that is nearest to it.
 struct NearVoxel {
   glm::dvec3 normal;  // out of the body, volume frame
   double gap_m;       // negative: inside the body
@@ -44,9 +44,9 @@ NearVoxel near_voxel(const voxel::SoftObject& object, const BodyObstacles& besid
   return {n, glm::dot(n, object.state().at(object.lattice().surface()[s])) - static_cast<double>(o.bound)};
 }
 
-// The contact of such a voxel, with zero force. Its point is the point of the body's surface that was nearest
-// at the query. The voxel may have moved along its half-space since. A force at its present place would turn
-// a ball.
+// The contact of a near voxel, with zero force. The contact's point is the point of the body's surface that
+// was nearest at the query. The voxel may have moved along its half-space since then. A force at the voxel's
+// present place would turn a ball.
 BodyContact contact_at(const SoftBody& body, const voxel::SoftObject& object, const BodyQuery& query,
                        std::uint32_t s, const NearVoxel& voxel_at) noexcept {
   const glm::dvec3 out = body.pose.rotation * voxel_at.normal;
@@ -147,13 +147,15 @@ double distance_to_body_m(const voxel::SoftObject& object, std::uint32_t s, cons
   return glm::clamp(glm::dot(voxel_at.normal, u - place), 0.0, voxel_at.gap_m);
 }
 
-// Adds the contact forces of the listed voxels. The force of each contact is the one that pulls its voxel
-// into the body along the normal. Links at their limits pass loads from voxel to voxel, also across the
-// normals, so only the sum of these loads is known. The normal forces may lack a part of this sum. That part
-// is divided among the voxels at limits along their normals, with the least sum of squared shares. (If each
-// voxel got the load that the links account to it, a ball would turn, which no surface without friction can
-// cause.) If multipliers of limits and obstacles are known that balance all loads, they are the forces: the
-// shares have no torque that a box could rest on.
+// Adds the contact forces of the listed voxels. The force of a contact is the one that pulls its voxel into
+// the body along the normal.
+//
+// If multipliers of limits and obstacles are known that balance all loads, they are the forces. Otherwise
+// links at their limits pass loads from voxel to voxel, also across the normals, so only the sum of these
+// loads is known. The normal forces may lack a part of this sum. That part is divided among the voxels at
+// limits along their normals, with the least sum of squared shares. If each voxel got the load that the links
+// account to it instead, a ball would turn, which no surface without friction can cause. The shares have no
+// torque that a box could rest on, so multipliers are preferred.
 void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   const voxel::SoftObject& object = *state.soft[o];
   const BodyObstacles& beside = state.body_obstacles[o];
@@ -187,7 +189,7 @@ void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::s
       add_contact(state, contact);
       continue;
     }
-    // A voxel that would not reach the body by itself presses only from the place where the two meet.
+    // A voxel that would not reach the body by itself presses only from the place where voxel and body meet.
     if (contact.force_N < 0.0) contact.force_N *= kLinkDamping;
     if (load.at_limit && pressed(n, voxel_at.normal) > 0.0) {
       contact.force_N += glm::dot(share, voxel_at.normal);

@@ -40,7 +40,7 @@ bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, 
 // Relaxes tissue under bodies on paths towards its least energy, where links are at their limits.
 void relax_under_paths(const World& world, WorldState& state) noexcept;
 
-// At the end of a tick, after all that moves tissue: moves every free body back that is too deep, and notes
+// At the end of a tick, after all that moves tissue: moves back every free body that is too deep, and notes
 // which voxels are jammed.
 void push_bodies_out_of_tissue(const World& world, WorldState& state, double dt_s) noexcept;
 

@@ -19,8 +19,7 @@ constexpr std::size_t kMaxRowsApplied = 250, kLeastRows = 100, kWorkOfRow = 16;
 // Number of parts in which a result's rows near a contact at rest are applied.
 constexpr int kResultParts = 8;
 // A submission or an application takes about 100 µs, and up to 300 µs. It waits up to kMaxWaits ticks for a
-// tick without a cycle of a large patch. Meanwhile the contact is asked to skip its cycles, and skips them as
-// long as the tool presses.
+// tick without a cycle of a large patch. While it waits, the contact skips its cycles if the tool presses.
 constexpr int kMaxWaits = 3;
 // Rows that another core relaxes in the time of a tick. A fixed-step session uses this to get its results as
 // late as a session in real time.
@@ -55,13 +54,13 @@ void submit(WorldState& state, AsyncObject& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.shadow.work() / kRowsRelaxed;
 }
 
-// Makes at most one exchange in the tick: a part of a result, the preparation of an exchange, a submission, a
-// result, or some of a result's far rows.
+// Makes at most one of these exchanges in the tick: a part of a result, the preparation of an exchange, a
+// submission, a result, or some of a result's far rows.
 void exchange(WorldState& state, std::size_t o, std::uint64_t& arrived) noexcept {
   AsyncObject& object = *state.async.objects[o];
   voxel::SoftObject& soft = *state.soft[o];
-  // A result's arrival is noted when it is seen, not when the result is applied, because the exchanges in
-  // between depend on it.
+  // Notes the arrival of a result in the tick in which it is seen. The result may be applied later, but the
+  // exchanges until then depend on its arrival.
   if (object.submitted && !object.arrived && has_arrived(state.async, object, o, state.tick)) {
     object.arrived = true;
     arrived |= std::uint64_t{1} << o;

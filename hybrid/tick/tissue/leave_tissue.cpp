@@ -41,7 +41,8 @@ bool touches_tissue(const World& world, WorldState& state, const glm::dvec3& poi
     const double reach = object.reach(world.tool.radius_m);
     if (glm::distance(world.soft[o].to_scene(object.position(v)), point) < reach) return true;
   }
-  return count == state.scratch.map_hits.size();  // there may be more than fit, and some may touch
+  return count ==
+         state.scratch.map_hits.size();  // if full: further voxels may not fit, and some of them may touch
 }
 
 bool touches_rigid(const World& world, const WorldState& state, const glm::dvec3& point) noexcept {

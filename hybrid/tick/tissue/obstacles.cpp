@@ -19,9 +19,9 @@ constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
 constexpr std::size_t kArrivedQueries = 40;
 constexpr double kInside = 0.01;  // spacings: a voxel deeper than this in a surface leaves it
 // kMovedEnough, kUnknownAhead and kKnownAhead are in spacings. A voxel queries again when two things hold: it
-// has moved by kMovedEnough, and it is within kUnknownAhead of where it might meet a surface that it does not
-// know. For a voxel with an obstacle the second distance is kKnownAhead, because its ball of half a spacing
-// meets no other surface earlier.
+// has moved by kMovedEnough, and it is within kUnknownAhead of where it might meet a surface unknown to it.
+// For a voxel with an obstacle the second distance is kKnownAhead, because its ball of half a spacing meets
+// no other surface earlier.
 constexpr float kMovedEnough = 0.25F, kUnknownAhead = 2.0F, kKnownAhead = 0.6F;
 // In objects with bricks, a voxel on its obstacle queries again when it has slid by kSlideOnObstacle
 // (spacings), so that it follows a curved surface. Links give way only along their axes and hardly need this.
@@ -48,8 +48,8 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
 
 namespace {
 
-// For a point inside a solid the direction away from the nearest surface points inwards, and would keep the
-// voxel inside. It is flipped.
+// Inside a solid, the direction from the surface's nearest point to the voxel points further inwards. An
+// obstacle with this normal would keep the voxel inside, so the direction is flipped.
 NearestRigid flip_if_inside(const World& world, const glm::dvec3& point, NearestRigid near) noexcept {
   const RigidObject& object = world.rigid[near.object];
   if (!near.found || !object.surface->inside(object.to_body(point))) return near;
@@ -109,7 +109,7 @@ class ObstacleQueue {
     const ObstacleQuery& seen = queries_[s];
     const glm::vec3 way = glm::vec3(object_.displacement(object_.lattice().surface()[s])) - seen.from;
     const float square = glm::dot(way, way);
-    // A voxel with an obstacle is held by that surface; others are further away.
+    // A voxel with an obstacle is held by the obstacle's surface; other surfaces are further away.
     const bool held = standing_obstacle(state_, soft_, s).normal != glm::vec3(0.0F);
     const float ahead = seen.clear_m / spacing_m_ - (held ? kKnownAhead : kUnknownAhead);
     const float enough = std::max(kMovedEnough, ahead) * spacing_m_;
@@ -138,7 +138,7 @@ class ObstacleQueue {
 
  private:
   struct Due {
-    float room_m;  // distance until the voxel may meet a surface that it does not know
+    float room_m;  // distance until the voxel may meet a surface unknown to it
     std::uint32_t s;
   };
   void add(const Due& due) noexcept {
@@ -182,8 +182,8 @@ void query_obstacle(const World& world, WorldState& state, std::size_t o, std::u
   }
   const voxel::Obstacle old = standing_obstacle(state, o, s);
   voxel::Obstacle fresh = obstacle_of(body, object, v, near);
-  // An opposite normal is that of the other side of a thin sheet: rounding moved the voxel through. The voxel
-  // keeps the side that it had.
+  // The opposite normal belongs to the other side of a thin sheet: rounding moved the voxel through the
+  // sheet. The voxel keeps its side.
   if (old.normal != glm::vec3(0.0F) && glm::dot(old.normal, fresh.normal) < 0.0F) return;
   // A voxel that overlaps leaves by at most kMovedEnough per query, never all at once. If it stayed at its
   // depth, a fast tool would press it deeper in each tick, and through the surface.

@@ -10,7 +10,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxHalvings = 6;           // most halvings of the search range if too many voxels are near
+constexpr int kMaxHalvings = 6;           // maximum number of halvings of the search range
 constexpr std::uint32_t kMapSlice = 512;  // surface voxels of each object that are updated per tick
 
 const glm::dvec3 kPunchAxis(0.0, 0.0, -1.0);  // a punch presses downwards in the scene
@@ -102,8 +102,8 @@ void press_tissue(const World& world, WorldState& state, const glm::dvec3& point
     if (object.touched().empty()) continue;
     const SoftBody& body = world.soft[o];
     const voxel::ToolInBody tool = tool_in_body(world, body, point);
-    // There are two waves of the chain. Voxels that the first wave moved along need not be pushed out by the
-    // second.
+    // Two waves of the chain: follow() moves pressed voxels along with the tool, so push_out() has fewer
+    // voxels left to push out.
     if (delta != glm::dvec3(0.0)) object.follow(glm::inverse(body.pose.rotation) * delta);
     object.push_out(tool);
     object.relax_near(tool, sweeps);

@@ -14,18 +14,18 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint32_t kPairSlice = 256;  // surface voxels per tick for which a partner is looked up
-// A contact is made within kFindRange (touching distances), before the surfaces touch, so that no voxel
-// passes the surface before its turn comes. It is dropped beyond kDropRange (touching distances).
+// A contact is made within kFindRange (touching distances), before the surfaces touch. So no voxel passes the
+// surface before its slice is searched. A contact is dropped beyond kDropRange (touching distances).
 constexpr double kFindRange = 1.5;
 constexpr double kDropRange = 1.75;
-// Gap at which a contact begins and ends to move its voxels (unit: touching distance). The hysteresis
-// prevents oscillation of surfaces that part.
+// A contact begins to move its voxels at a gap below kHoldGap, and ends at a gap above kReleaseGap (touching
+// distances). The hysteresis prevents oscillation of surfaces that part.
 constexpr double kHoldGap = 0.1, kReleaseGap = 0.3;
 // A contact that is too far apart to press is queried once in this many ticks.
 constexpr std::size_t kFarContactTurns = 4;
 constexpr int kPairSweeps = 2;
 // kAloneRounds: rounds in which an object that the tool does not press gives way alone. kAloneDepth: the
-// deepest overlap for which it does so (unit: touching distance). Slow motion causes no deeper one.
+// deepest overlap for which it does so (touching distances). Slow motion causes no deeper overlap.
 constexpr int kAloneRounds = 2;
 constexpr double kAloneDepth = 0.1;
 
@@ -164,8 +164,8 @@ void update_contacts(const World& world, WorldState& state) noexcept {
   }
 }
 
-// Voxels that a sweep moved over the edge of their facet get their new facet before the next sweep. False:
-// there were none.
+// Gives a new facet to each voxel that a sweep moved over the edge of its facet. For use before the next
+// sweep. False: there were none.
 bool follow_over_edges(const World& world, WorldState& state) noexcept {
   bool any = false;
   for (FacetContact& pair : state.facet_contacts) {
@@ -180,8 +180,8 @@ bool follow_over_edges(const World& world, WorldState& state) noexcept {
   return any;
 }
 
-// Where the chain is tight, the tool holds an object that it presses, so the other object gives way. Sharing
-// the overlap would push tissue back into the tool in every tick.
+// The object that gives way first. Where the chain is tight, the tool holds the object that it presses, so
+// the other object gives way. If both gave way, tissue would be pushed back into the tool in every tick.
 voxel::GiveWay first_to_give(const World& world, WorldState& state, const FacetContact& pair) noexcept {
   const auto [ia, ib] = world.soft_pairs[pair.soft_pair];
   const bool of_a = state.reactions[ia].pressed > 0, of_b = state.reactions[ib].pressed > 0;
@@ -194,7 +194,8 @@ voxel::GiveWay first_to_give(const World& world, WorldState& state, const FacetC
 }
 
 // Moves whole chains to remove overlaps that relaxation of links could not remove. First the object that
-// first_to_give() names gives way, then both objects, and then, if anchors hold one, the other.
+// first_to_give() names gives way, and then both objects. If anchors hold one object, the other one gives way
+// at last.
 void separate_pairs(const World& world, WorldState& state) noexcept {
   using voxel::GiveWay;
   for (FacetContact& pair : state.facet_contacts) {
@@ -240,8 +241,8 @@ void solve_soft_contacts(const World& world, WorldState& state) noexcept {
     for_pairs(voxel::load_pair);
   };
   load();
-  // In an object that the tool presses, dependents of pair voxels may also depend on voxels under the tool,
-  // which have their load already.
+  // In an object that the tool presses, pairs get no dependents: these may also depend on voxels under the
+  // tool, which carry the dependents' load already.
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (state.reactions[o].pressed == 0) {
       state.soft[o]->find_pair_dependents();
@@ -254,7 +255,7 @@ void solve_soft_contacts(const World& world, WorldState& state) noexcept {
     for_pairs(voxel::relax_pair);
   }
   separate_pairs(world, state);
-  load();  // with the facets as they are now
+  load();  // the facets may have changed
 }
 
 }  // namespace hybrid

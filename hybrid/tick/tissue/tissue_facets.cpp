@@ -94,15 +94,14 @@ bool in_resting_tissue(const voxel::SoftObject& object, const glm::dvec3& point)
 
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
                          std::span<voxel::ToolBound> out) noexcept {
-  // A punch needs no facets: its face touches tissue at just this distance, and the voxels under it press on
-  // it.
+  // A punch needs no facets. The voxels under its flat face stop it at the same distance.
   if (tool.shape == voxel::ToolInBody::Shape::punch) return 0;
   const voxel::Lattice& lattice = object.lattice();
   // The surface of tissue is half a spacing outside its outermost voxels.
   const double surface = object.voxel_radius(), reach = within + surface;
-  // The nearest point of a triangle lies at right angles to its plane or to a side, and no further from the
-  // nearest corner than the longest side over the root of 3. That side is the diagonal of a square, two links
-  // at most.
+  // The line from the centre to a triangle's nearest point is perpendicular to the triangle's plane or to a
+  // side, or ends at a corner. The nearest point is at most (longest side)/√3 from the nearest corner. The
+  // longest side is the diagonal of a square, at most two links long.
   const double near = std::hypot(reach, 2.0 / std::numbers::sqrt3 * longest_link_m(lattice));
   std::size_t count = 0;
   const auto add = [&](const voxel::ToolBound& bound) {

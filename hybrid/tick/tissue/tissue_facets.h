@@ -16,7 +16,7 @@ namespace hybrid {
 // For a ball: writes half-spaces of facets (triangles of surface voxels) that face the tool's centre. The
 // centre must stay outside the tissue's surface, which lies half a spacing outside each facet. `within`:
 // largest distance of the centre from that surface (m). Only facets that bound a full cell of eight voxels
-// count: others have no inner side. Returns how many; stops when `out` is full.
+// count: others have no inner side. Returns how many were written; stops when `out` is full.
 std::size_t facet_bounds(const voxel::SoftObject& object, const voxel::ToolInBody& tool, double within,
                          std::span<voxel::ToolBound> out) noexcept;
 
