@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kTick = 1e-3;
 constexpr int kWide = 36, kHigh = 20;  // voxels of a block; a ball has the same width
-// Pa; forces are some newtons, so a JND is a share of them rather than the floor.
+// Pa. Forces are some newtons, so the JND is a share of the force, not its floor.
 constexpr double kYoung = 1e5;
 constexpr double kAway = 0.5;  // spacings above the surface at which strokes begin and end
 // Share of the lattice's force scale; a reference with a smaller residual is at rest.
@@ -101,7 +101,7 @@ Scene stroke_scene(const StrokeCase& stroke) {
   Anchors anchors;
   std::map<std::uint8_t, std::string> materials;
   if (stroke.block == Smooth::layered) {
-    // Skin, fat and muscle: soft between firm. The top layer is three voxels thick.
+    // Skin, fat and muscle: a soft layer between two firm ones. The top layer is three voxels thick.
     formula.layers = {{0.5 * kHigh * kSoftSpacing_m, 2}, {(0.5 * kHigh - 3.0) * kSoftSpacing_m, 1}};
     formula.label = 2;
     materials[2] = "firm";
@@ -127,7 +127,7 @@ std::vector<glm::dvec3> stroke_corners(const StrokeCase& stroke) {
   const glm::dvec3 n = outwards(stroke.block);
   const double surface = 0.5 * (stroke.block == Smooth::oblique ? kWide : kHigh) * kSoftSpacing_m;
   const double touched = surface + stroke.radius_spacings * kSoftSpacing_m;
-  // The stroke must not run along the lattice in any direction.
+  // The stroke must not be parallel to any axis of the lattice.
   const glm::dvec3 side = glm::normalize(glm::cross(n, glm::dvec3(0.3, 1.0, 0.2))),
                    other = glm::cross(n, side);
   const glm::dvec3 start = touched * n - 0.5 * stroke.slide_spacings * kSoftSpacing_m * side +

@@ -15,8 +15,8 @@ namespace hybrid::bench {
 enum class Smooth : std::uint8_t { homogeneous, layered, oblique };
 const char* smooth_name(Smooth block);
 
-// The tool, a ball, strokes a block of 1 mm voxels, or the side of a ball of such voxels. In the latter no
-// layer of voxels lies along the surface.
+// The tool is a ball. It strokes the top of a block of 1 mm voxels, or the side of a ball of such voxels. On
+// the ball no layer of voxels lies along the surface.
 struct StrokeCase {
   Smooth block = Smooth::homogeneous;
   double radius_spacings = 4.0;
@@ -32,8 +32,8 @@ std::vector<glm::dvec3> stroke_corners(const StrokeCase& stroke);
 
 struct StrokeResult {
   std::uint64_t ticks = 0;  // in contact
-  // How much larger the steps of the tick's force are than those of the equilibrium. Unit: JND of the
-  // equilibrium's force.
+  // Excess: length of the step of the tick's force minus that of the equilibrium's force; 0 if negative.
+  // Unit: JND of the equilibrium's force, or N.
   double excess_p50_jnd = 0.0, excess_p99_jnd = 0.0, excess_max_jnd = 0.0, excess_max_N = 0.0;
   double excess_at_tick = 0.0;  // tick with the largest excess
   double error_max_jnd = 0.0;   // error of the force itself
@@ -45,9 +45,9 @@ struct StrokeResult {
 // with the tool at the proxy's place.
 StrokeResult measure_stroke(const Scene& scene, const std::vector<glm::dvec3>& corners, double speed_m_per_s);
 
-// Work of the force on the device along the path (J), by the trapezoidal rule; no reference is computed. The
-// rule excludes the work of sampling: a force that is held for a tick while the hand moves on puts out K·v²·T
-// a second (device/README.md).
+// Work of the force on the device along the path (J), by the trapezoidal rule. No reference is computed. The
+// rule excludes the work of sampling: a force that is held for a tick while the hand moves on gives out
+// K·v²·T per second (device/README.md).
 double work_of_stroke(const Scene& scene, const std::vector<glm::dvec3>& corners, double speed_m_per_s);
 
 }  // namespace hybrid::bench

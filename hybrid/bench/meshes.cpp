@@ -134,7 +134,7 @@ class Geodesic {
   int f_;
   double radius_;
   polygon::TriangleMesh mesh_;
-  // Two corners, and the first vertex between them.
+  // Key: the two corners of an edge, the lower first. Value: the first vertex between them.
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> edges_;
 };
 

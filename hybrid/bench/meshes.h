@@ -23,21 +23,23 @@ struct BenchMesh {
   polygon::TriangleMesh mesh;       // counter-clockwise as seen from outside; each vertex occurs once
 };
 
-// ico0 … ico9: a unit icosahedron whose triangles are cut into four n times: 20·4ⁿ triangles.
-// geo1 … geo1024: its faces are cut into n² triangles each (707: 9,996,980), for sizes between and beyond.
-// cube1 … cube1024, corner1 … corner1024: a cube, and three quarter planes that meet, with n quads an edge.
-// Every vertex of a ball lies on the sphere of bench::kSphereRadius_m. All sizes are multiplied by `scale`.
-// Throws std::invalid_argument that lists the names.
+// ico0 … ico9: a ball. Each triangle of an icosahedron is divided n times into four: 20·4ⁿ triangles.
+// geo1 … geo1024: a ball. Each face of an icosahedron is divided into n² triangles (geo707: 9,996,980 in
+// all). These meshes have sizes between and beyond those of ico.
+// cube1 … cube1024: a cube with n quads along each edge.
+// corner1 … corner1024: three quarter planes that meet, with n quads along each edge.
+// The vertices of a ball lie on the sphere of radius bench::kSphereRadius_m. All sizes are multiplied by
+// `scale`. Throws std::invalid_argument for another name; the message lists the valid ones.
 BenchMesh make_bench_mesh(const std::string& name, double scale = 1.0);
 
-// The shape that a name stands for, without making the mesh. Throws the same exception.
+// The shape of the mesh of this name, without making the mesh. Throws std::invalid_argument for another name.
 BenchShape bench_mesh_shape(const std::string& name);
 std::size_t bench_mesh_triangles(const std::string& name);
 
 // Is this the path of a file and not one of the names above? A path has a dot or a slash.
 bool is_bench_mesh_file(std::string_view name);
-// Loads a mesh file and moves the middle of its box to the origin. `notes`: gets its defects in words. Throws
-// polygon::MeshError.
+// Loads a mesh file and moves the middle of its bounding box to the origin. Adds the defects of the mesh to
+// `notes`, in words. Throws polygon::MeshError.
 BenchMesh load_bench_mesh(const std::string& file, double unit_m, std::vector<std::string>& notes);
 
 // The ball of mesh geo<frequency>.

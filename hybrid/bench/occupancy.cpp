@@ -31,8 +31,8 @@ constexpr std::array<int, 2> kBoxes{1, 5};  // cells along an edge: one cell, or
 
 struct QueryBox {
   glm::dvec3 low, high;
-  // The box that the map is asked for. For one cell of voxels it is a point in the cell, which gives the same
-  // answer.
+  // The box that is looked up in the map. For voxels and a box of one cell it is a point in that cell, which
+  // gives the same answer.
   glm::dvec3 map_low, map_high;
 };
 using Found = std::array<std::uint32_t, kMostFound>;
@@ -163,7 +163,7 @@ void OccupancyBench::build(const std::function<void(OccupancyRow)>& add) {
 QueryBox OccupancyBench::box_about(const glm::dvec3& p, int box_cells) const {
   const CellCoordinates c = index_.cell_of(p);
   const double reach = 0.5 * (box_cells - 1);
-  // The box ends just inside the faces of cells, where no voxel is.
+  // The faces of the box lie just inside faces of cells. No voxel is near a face of a cell.
   const glm::dvec3 middle = ball_.cell_m * (glm::dvec3(c[0], c[1], c[2]) + 0.5),
                    half(ball_.cell_m * (reach + 0.5 - 1e-3));
   const QueryBox box{middle - half, middle + half, middle - half, middle + half};
@@ -252,8 +252,8 @@ void OccupancyBench::look_up(OccupancyPattern pattern, int box_cells,
         // Continues where the last round ended. The first batch of a round is a warm-up.
         const std::size_t first = at[e], count = samples[e].batch;
         at[e] = (first + count) % boxes.size();
-        // Boxes are copied first, because a caller has them at hand. From a list of ten megabytes, reading
-        // one took 3 to 5 ns if another engine had used the caches in between.
+        // The boxes are copied first, because a caller has its box in the cache. Reading a box from a list of
+        // ten megabytes took 3 to 5 ns if another engine had used the caches in between.
         std::copy_n(boxes.begin() + static_cast<std::ptrdiff_t>(first), count, asked.begin());
         const std::span questions(asked.data(), count);
         std::size_t found = 0;

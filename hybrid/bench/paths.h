@@ -51,16 +51,19 @@ double least_spiral_speed_m_s();
 // the goal.
 glm::dvec3 sphere_reference(const glm::dvec3& goal, double tool_radius_m);
 
-// Paths at the sphere. far: a circle 0.3 m away. hover: 1 mm above it. slide: pressed and drawn over it 5 mm
-// deep, where the press leads in. tap: tapped into it at 2 m/s, each tap with a fresh start.
+// Paths at the sphere.
+// far: a circle 0.3 m away.
+// hover: 1 mm above the sphere.
+// slide: the goal is pressed 5 mm deep and then drawn over the sphere. The press leads in and does not count.
+// tap: the goal is tapped into the sphere at 2 m/s. Each tap starts anew (GoalPath::starts).
 GoalPath far_path(int ticks = 5000);
 GoalPath hover_path(double tool_radius_m, double speed_m_s, int ticks = 20000);
 GoalPath slide_path(double tool_radius_m, double speed_m_s, int ticks = 20000);
 GoalPath tap_path(double tool_radius_m, int taps = 5000);
 
-// As the slide, on the mesh of a file whose vertices are within kSphereRadius_m of the origin. The goal is
-// kSlideDepth_m below the surface that is met first on the way to the origin. `surface_m` gives the distance
-// of that surface from the origin in a direction; if it is empty, the last distance is kept. A point at
+// Like slide_path(), on the mesh of a file whose vertices are within kSphereRadius_m of the origin. The goal
+// is kSlideDepth_m below the surface that a ray to the origin meets first. `surface_m` gives the distance of
+// that surface from the origin in a direction; if it is empty, the last distance is kept. A point at
 // kSphereRadius_m moves at `speed_m_s`. There is no closed form.
 GoalPath drape_path(double tool_radius_m, double speed_m_s, int ticks,
                     const std::function<std::optional<double>(const glm::dvec3&)>& surface_m);

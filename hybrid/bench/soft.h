@@ -19,9 +19,9 @@ struct SoftBenchOptions {
   std::vector<std::string> cases;   // empty: all
   std::vector<SoftEngine> engines;  // empty: all
   std::vector<double> depths;       // depths of the waves at slack 0.1, in spacings; empty: 5, 10 and 20
-  double wave_s = 2.0;              // about so much time goes into repeats of a wave; there are at least five
-  std::vector<int> sizes;           // voxels along an edge, for sessions and loads; empty: 64 and 128
-  double session_s = 2.0;           // simulated time of a session
+  double wave_s = 2.0;     // approximate time for the repeats of a wave; there are at least five repeats
+  std::vector<int> sizes;  // voxels along an edge, for sessions and loads; empty: 64 and 128
+  double session_s = 2.0;  // simulated time of a session
   Progress progress;
   std::function<void(const SoftRow&)> on_row;  // called for each row as soon as it is there
 };

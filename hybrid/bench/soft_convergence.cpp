@@ -34,17 +34,16 @@ Object object_of(const std::array<int, 3>& dims, const std::array<int, 3>& pushe
   return object;
 }
 
-// The corner of a plate in which all other voxels are held. Its two links each ask for the same step, and it
-// makes both.
+// The corner of a plate in which all other voxels are held. Each of its two links requires the same step, and
+// the corner moves by the sum of both.
 Object corner() {
   Object object = object_of({4, 4, 1}, {0, 0, 0}, voxel::ThesisChainMailOptions::Movement::sum);
   for (std::size_t n = 1; n < object.volume.labels.size(); ++n) object.options.anchor_voxels.push_back(n);
   return object;
 }
 
-// All voxels move at once to the mean of the places that their links require. So a voxel and its neighbours
-// swing in turns.
-// (With the sum it would diverge.)
+// All voxels move at once, each to the mean of the places that its links require. So a voxel and its
+// neighbours swing in turns. (If each moved by the sum, the relaxation would diverge.)
 Object block() {
   Object object = object_of({15, 15, 8}, {7, 7, 7}, voxel::ThesisChainMailOptions::Movement::mean);
   object.options.anchor_faces = {"-z"};

@@ -32,8 +32,8 @@ class ChainEngine : public WaveEngine {
     moves_ = push.moves;
   }
   void rest() override {
-    // Writes only the rows that moved. Half a gigabyte of zeros would leave lines in the caches, which the
-    // next wave would have to send to memory first.
+    // Writes only the rows that moved. Half a gigabyte of zeros would leave lines in the caches that the next
+    // wave would first have to write back to memory.
     for (auto& axis : state_->u) {
       for (float* row = axis.begin(); row != axis.end(); row += voxel::kRow) {
         if (std::any_of(row, row + voxel::kRow, [](float u) { return u != 0.0F; }))

@@ -44,12 +44,15 @@ class WaveEngine {
 };
 std::unique_ptr<WaveEngine> make_wave_engine(SoftEngine engine);
 
-// The result of a wave from rest. `moved`: voxels away from rest. `violated`: links beyond their limits.
-// `unsupported`: displaced voxels without a cause, that is without a link at its limit to a voxel that is
-// further from rest. `source_off_m`: greatest distance of a source from its target (m). Differences count
-// above a tolerance for rounding: the links on the longest way from a source, times the spacing of floats at
-// the largest displacement. If the last three are zero, the state is exactly that of the definition: a
-// shortest chain of links at their limits leads from each voxel to a source.
+// The state after a wave from rest.
+//   moved         voxels away from rest
+//   violated      links beyond their limits
+//   unsupported   displaced voxels without a cause: no link at its limit leads to a voxel further from rest
+//   source_off_m  greatest distance of a source from its target (m)
+// Differences count only above a tolerance for rounding. It is the number of links on the longest way from a
+// source, times the spacing of floats at the largest displacement. If the last three figures are zero, the
+// state is exactly that of the definition: a shortest chain of links at their limits leads from each voxel to
+// a source.
 struct WaveState {
   std::size_t moved = 0, violated = 0, unsupported = 0;
   double source_off_m = 0.0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A ball is pressed ten spacings deep into a block, in steps and without relaxation. Measured is the time
-// until the force on it is within 1 % of its final value.
+// A ball is pressed ten spacings deep into a block, in steps and without relaxation. Then the time is
+// measured until the force on the ball is within 1 % of its final value.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ constexpr int kSweepsNear = 2;
 constexpr double kConverged = 0.01;
 constexpr double kAsked_us = 100e3;  // working time after which the force's error is stated
 constexpr int kMostRounds = 4000;
-constexpr double kCalm = 1e-4;   // share of the force; the force is calm if it changes by less …
-constexpr int kCalmRounds = 30;  // … for so many rounds; then the measurement ends
+constexpr double kCalm = 1e-4;   // share of the force; a round is calm if the force changes by no more
+constexpr int kCalmRounds = 30;  // number of calm rounds in a row that ends the measurement
 constexpr double kReferenceTolerance = 1e-6;  // share of the lattice's force scale
 constexpr int kReferenceCycles = 200;
 
@@ -141,9 +141,10 @@ double settled_force_N(int edge, const Limits& limits) {
   return pressed.force_N();
 }
 
-// Runs the work of the tick and of its relaxation thread in turns on one core, on an object that stays
-// pressed, until nothing is left to do. `at_rest_N`: the final force if it is known better than from whole
-// cycles, which stall where a chain is tight.
+// Runs the work of the tick and that of its relaxation thread in turns on one core. The object stays pressed.
+// The run ends when nothing is left to relax. `at_rest_N`: the final force, if it is known from another
+// measurement. This is needed where a chain is tight, because there whole cycles stall. If it is empty, the
+// final force is found by whole cycles.
 SoftRow relax_row(int edge, const Limits& limits, std::optional<double> at_rest_N) {
   const TickTimer timer;
   Pressed pressed(edge, limits);
@@ -238,7 +239,7 @@ TightRow tight_row(int edge, bool layered) {
     tool.centre.z = top + object.reach(tool.radius) - depth * kSoftSpacing_m;
     std::vector<voxel::VoxelId> near(lattice->surface().begin(), lattice->surface().end());
     for (int n = 0; n < kTicks; ++n) {
-      // As a tick does first: lists the voxels that are near, or may be.
+      // Lists the voxels that are near or may come near, as a tick does first.
       const double away = object.reach(tool.radius) + kSoftSpacing_m;
       if (object.patches_in_use() != nullptr)
         near.assign(object.near_on_grid().begin(), object.near_on_grid().end());

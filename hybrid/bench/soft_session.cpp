@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSlack = 0.1, kSpeed = 0.5, kToolRadius = 8.0 * kSoftSpacing_m;
 constexpr double kMostDepth = 20.0;  // unit: spacing
-constexpr int kSamples = 1'000'000;  // of the force's error: all ticks in which tissue is pressed
+constexpr int kSamples = 1'000'000;  // of the force's error; enough for all ticks in which tissue is pressed
 
 // At slack 0.1 a push reaches ten times as far as it is deep, and no chain is longer than the cube. So small
 // cubes are pressed less deep: the tool must feel the tissue, not its anchors.

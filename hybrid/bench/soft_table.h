@@ -49,8 +49,8 @@ std::string soft_table_head();
 std::string soft_table_line(const SoftRow& row);
 
 // Growth of moved voxels and of times with relative deformation, depth / slack, by least squares over the
-// homogeneous waves along one axis. The thesis (chapter VI) states exponential growth. The octahedron of the
-// closed form gives growth with the cube.
+// homogeneous waves along one axis. The thesis (chapter VI) states exponential growth. In the closed form the
+// moved voxels are an octahedron, whose volume grows with the cube of depth / slack.
 struct Growth {
   std::size_t points = 0;
   double moved_exponent = 0.0, moved_r2 = 0.0;                        // log moved over log(depth/slack)

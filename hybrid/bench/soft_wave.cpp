@@ -15,7 +15,7 @@ namespace {
 struct Wave {
   std::string material;
   double depth = 0.0, slack = 0.1;  // unit: spacing
-  int axes = 1;                     // 1: down; 3: as far on x and y as down
+  int axes = 1;                     // 1: down; 3: equally far along x, y and z
 };
 
 struct Engine {
@@ -84,9 +84,9 @@ void add_with_speedup(std::vector<SoftRow> rows, const AddRow& add) {
 }
 
 // Runs each engine from rest, in turns, so that other load of the machine affects all alike. The first run of
-// a turn does not count, because the caches still hold what the other engine wrote, and nobody uses two
-// engines at once. (With a turn of one run, classic's cache lines went to memory during our runs. That was
-// half of the time of a wave ten spacings deep.)
+// a turn does not count: the caches still hold the data of the other engine, and nobody uses two engines at
+// once. (With a turn of one run, the cache lines of classic were written back to memory during our runs. That
+// was half of the time of a wave ten spacings deep.)
 void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::LabelVolume& volume,
               const voxel::LatticeOptions& options, double most_us, const AddRow& add) {
   double spent_us = 0.0;
@@ -112,7 +112,7 @@ void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::Label
 }
 
 // The published comparison: 50 voxels along an edge, and one voxel of the top pushed a hundred times by a
-// tenth of a spacing. The slack is that which gives its 25,234 displaced voxels. The time of a push is the
+// tenth of a spacing. The slack is chosen to displace 25,234 voxels, as published. The time of a push is the
 // median over the rounds.
 void run_pushes(std::vector<Engine>& engines, int rounds, const AddRow& add) {
   constexpr int pushes = 100, edge = 50;

@@ -166,7 +166,7 @@ class ThreadBench {
     return tape;
   }
 
-  // Plays it in real time, with these results handed out by another thread.
+  // Plays the session again in real time, while another thread hands out the results on `tape`.
   void play(const SessionResult& felt, ResultTape& tape) {
     const ScopedFlushToZero flushed;
     BuiltScene built = build_scene(scene_);

@@ -24,22 +24,22 @@ struct ThreadsBenchOptions {
 
 // One scene under one load.
 struct ThreadsRow {
-  std::string scene, load;                               // relaxation, memory, nothing relaxed
+  std::string scene, load;                               // "relaxation", "memory" or "nothing relaxed"
   std::uint64_t ticks = 0, late_ticks = 0, results = 0;  // results: of relaxation, applied by ticks
   Percentiles tick_us;                                   // processor time of the servo thread
   double p99_ratio = 0.0, p999_ratio = 0.0;              // relative to the same scene under `memory`
   double relaxation_share = 0.0;                         // share of the time that the relaxation thread works
-  // Are the ticks those of `relaxation`, by their hash?
+  // Do the ticks have the same hash as those under `relaxation`?
   bool same_ticks = true;
 };
 
 // Loads, in turns:
-//   relaxation       the session's relaxation thread, which also publishes surfaces as often as it can.
-//                    Besides, another session of the scene is relaxed, and its surfaces are taken, without a
-//                    pause.
-//   memory           instead, a thread that copies 256 MB to and fro. The session before is played again with
-//                    its inputs. The copying thread hands its asynchronous results to the ticks that applied
-//                    them. So another core wrote the results here, too.
+//   relaxation       the session's relaxation thread, which also publishes surfaces as often as it can. A
+//                    further thread relaxes another session of the scene without a pause, and takes its
+//                    surfaces.
+//   memory           the session under `relaxation` is played again with its inputs, while a thread copies
+//                    256 MB to and fro. That thread also hands each asynchronous result to the tick that had
+//                    applied it. So here, too, another core wrote the results.
 //   nothing relaxed  as `memory`, but no result ever arrives: the cost of ticks that have less to do.
 // Throws SceneError.
 std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options);

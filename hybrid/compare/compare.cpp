@@ -119,9 +119,9 @@ ModelResult classic_model(const RigidDescription& rigid, const Tool& tool, const
   return model;
 }
 
-// Does the rigid closed form hold along the motion? It knows only the present position of the device, not the
-// side that the device came from. It holds as long as its tool position never jumps further than the device
-// moves, in the object's frame. The tolerances are for rounding and for rounded corners.
+// Does the rigid closed form hold along the motion? The form knows only the present position of the device,
+// not the side from which the device came. It holds as long as its tool position never jumps further than the
+// device moves, in the frame of the object. The tolerances allow for rounding and for rounded corners.
 bool holds_along(const ClosedForm& form, const Tool& tool, const std::vector<TraceRow>& rows,
                  const std::vector<Pose>& poses) {
   if (form.young_Pa > 0.0) return true;

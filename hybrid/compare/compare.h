@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One object of a scene, rendered by several models along the same motion. All objects: as mesh with a proxy;
-// as voxels where it has any; in closed form where there is one (ball, box or block under a ball; flat punch
-// on a block). Rigid objects also: by the surface nearest to the device, without a proxy (thesis, Fig 18).
-// Soft objects also: by the algorithm of the thesis (voxel/baseline/thesis_chainmail.h).
+// One object of a scene, rendered by several models along the same motion.
+//   Any object: mesh with a proxy; voxels, if the object has any; closed form, if there is one (ball, box or
+//   block under a ball; flat punch on a block).
+//   Rigid objects also: the surface nearest to the device, without a proxy (thesis, Fig 18).
+//   Soft objects also: the algorithm of the thesis (voxel/baseline/thesis_chainmail.h).
 #pragma once
 
 #include <string>
@@ -23,7 +24,7 @@ struct ModelResult {
   Percentiles tick_us;  // all zero for a closed form
   // Differences from the reference, over the ticks in which at least one of the two has a force:
   double rms_N = 0.0, max_N = 0.0, jnd_p50 = 0.0, jnd_p99 = 0.0, share_above_1_jnd = 0.0;
-  // Of ticks in which both forces exceed the JND floor.
+  // Angle to the reference, over the ticks in which both forces exceed the JND floor.
   double direction_p50_deg = 0.0, direction_p99_deg = 0.0;
   double work_J = 0.0;  // work of the force on the hand along the path, by the trapezoidal rule
 };

@@ -27,8 +27,8 @@ std::string tool_in_words(const Tool& tool) {
                      1e3 * tool.radius_m);
 }
 
-// Names that differ from one another: the stem of the file. If two stems are equal, the whole file name. If
-// those are equal too, the stem with a number.
+// Names that differ from one another. A name is the stem of the file. If two stems are equal, it is the whole
+// file name. If those are equal too, it is the stem with a number.
 std::vector<std::string> scene_names(std::span<const Scene> scenes) {
   std::vector<std::string> names;
   for (std::size_t s = 0; s < scenes.size(); ++s) {

@@ -6,11 +6,13 @@
 namespace hybrid {
 namespace {
 
-// Nearer to the surface than this share of the object's size, the direction to it is made of rounding.
+// Share of the size of the object. At a smaller distance from the surface, the direction to it is mostly
+// rounding error.
 constexpr double kOnSurface = 1e-12;
 
-// Outward at a point of a solid's surface. A step off the surface finds the side of a shape that has no flat
-// faces: it is far above rounding, and far below what a hand feels.
+// Outward normal at a point of a solid's surface. A shape without flat faces has no face normal. There the
+// normal is found from a point one step off the surface. The step is far above rounding, and far below a
+// distance that a hand feels.
 glm::dvec3 outward(const polygon::RigidSurface& surface, const polygon::NearPoint& on, double size_m) {
   constexpr double kStep = 1e-7;  // of the object's size
   const glm::dvec3 face = surface.face_normal(on.element);
@@ -46,7 +48,7 @@ ClassicForce nearest_surface_force(const polygon::RigidSurface& surface, const P
     direction = away / distance;
   } else if (surface.solid()) {
     direction = outward(surface, near, size);
-  }  // on a sheet neither side is right, and this model knows no other
+  }  // exactly on a sheet no side is the right one: the direction stays zero
   out.force_N = stiffness_N_per_m * depth * (pose.rotation * direction);
   return out;
 }

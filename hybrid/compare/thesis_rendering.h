@@ -11,9 +11,9 @@ namespace hybrid {
 
 // Plays the soft object along the device positions of `like`. Each tick has the six-direction check, the
 // chain, the force of the lines through the touched element, and relaxation of as many elements as the
-// object's budget says. Relaxation is damped as in the thesis's final version. Its time is part of the tick's
-// time, as it is for `voxels`. The result is this force itself: there is no coupling. Throws std::exception
-// in words.
+// object's budget says. Relaxation is damped as in the thesis's final version. The tick's time includes that
+// of relaxation, as it does for model "voxels". There is no coupling: the result is the force of the tissue
+// itself. Throws std::exception with a message for people.
 ModelResult classic_voxels(const Scene& scene, const SoftDescription& soft,
                            const std::vector<TraceRow>& like);
 

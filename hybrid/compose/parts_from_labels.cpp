@@ -144,9 +144,9 @@ std::vector<bool> held_pieces(const LabelVolume& tissue, const std::vector<bool>
   return held;
 }
 
-// Settles tissue that no bone holds, because it has no equilibrium. Small pieces are removed. In the others,
-// the layer nearest to the back becomes labels of its own, which the scene anchors: the body lies on its
-// back.
+// Treats tissue that no bone holds: without anchors it has no equilibrium. Small pieces are removed. In each
+// other piece, the layer nearest to the body's back gets labels of its own. The scene anchors these labels,
+// because the body lies on its back.
 class LooseTissue {
  public:
   LooseTissue(LabelVolume& tissue, SoftPart& part, SceneParts& parts)

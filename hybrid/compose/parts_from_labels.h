@@ -90,8 +90,9 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
 void add_mesh(const std::filesystem::path& file, const std::string& name, const Placement& placement,
               ComposeFolder& folder, SceneParts& parts, const Progress& progress);
 
-// Spacing along all axes at which `filled` voxels of tissue answer readily and are felt where they are drawn.
-// Empty: the volume's own spacing is good. `why` gets the reason.
+// Spacing, equal along all axes, for a volume with too many voxels of tissue or with thick slices. `filled`:
+// number of voxels of tissue. With this spacing the tissue answers readily and is felt where it is drawn.
+// Empty: the spacing of the volume is good. `why`: gets the reason.
 std::optional<double> ready_spacing_m(const voxel::LabelVolume& volume, std::size_t filled, std::string& why);
 
 // The labels that have voxels, with the number of their voxels.

@@ -15,7 +15,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kPixels = 400.0;    // most pixels along the scene's longest side
+constexpr double kPixels = 400.0;    // greatest number of pixels along the scene's longest side
 constexpr double kSoftDepth = 0.8;   // depth of a press beyond first contact with tissue, in tool radii
 constexpr double kBoneDepth = 0.25;  // the same on bone, which does not give way
 // Height above the obstacles between two presses; at least the tool's diameter.
@@ -25,7 +25,7 @@ constexpr double kHold_s = 1.0;
 // radii. The tool is lifted where the surface falls or rises by more than kSteep times the step.
 constexpr double kStrokeDepth = 0.25, kStrokeStep = 1.5, kSteep = 1.5;
 constexpr double kFastest_m_per_s = 0.06;             // speed of a hand that explores
-constexpr std::size_t kMostRigid = 8, kMostSoft = 8;  // presses of each kind at most
+constexpr std::size_t kMostRigid = 8, kMostSoft = 8;  // greatest number of presses of each kind
 constexpr double kNothing = -std::numeric_limits<double>::infinity();
 
 // Something that is pressed once: a family of bones, a mesh, or a tissue.
@@ -317,8 +317,8 @@ std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, con
   return points;
 }
 
-// The best places, at most kMostRigid and kMostSoft, in the order of visits: view after view, and within a
-// view each time the nearest next.
+// The best places, at most kMostRigid and kMostSoft. They are in the order of visits: view after view, and
+// within a view always the nearest place next.
 std::vector<Chosen> choose(const Surfaces& all, const std::vector<HeightMap>& maps) {
   std::vector<Chosen> best(all.targets.size());
   for (std::size_t view = 0; view < maps.size(); ++view) {

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::string_view kStaging = ".compose-";  // and the number of the process
+constexpr std::string_view kStaging = ".compose-";  // followed by the process id
 
 // Removes the folders that killed processes left.
 void remove_stale_staging(const fs::path& folder) {

@@ -134,7 +134,7 @@ class ComparePlot {
     return next != contacts_.end() && t_s >= next->from_s ? &*next : nullptr;
   }
 
-  // Does the model in some contact push opposite to the reference's largest force there?
+  // Is there a contact in which the model pushes opposite to the reference's largest force?
   bool reverses(const ComparedModel& model) const {
     return std::ranges::any_of(model.rows, [&](const TraceRow& row) {
       const Contact* const contact = contact_at(row.t_s);
@@ -188,8 +188,8 @@ class ComparePlot {
     group.panels.push_back(std::move(difference));
   }
 
-  // Angle of each model's force to the reference's force, at the reference's ticks. Of a model with its own
-  // times, the last tick before counts. There is no series if all angles are small.
+  // Angle between each model's force and the reference's force, at the reference's ticks. A model that has
+  // its own times counts with its last tick up to then. There is no series if all angles are small.
   Panel direction_panel() const {
     Panel panel;
     panel.title = "Direction: angle to the force of " + reference_.name;

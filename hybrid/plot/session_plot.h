@@ -19,14 +19,15 @@ struct PlottedObject {
   bool soft = false;
   // Force of this object in each tick (N), one entry per row of the trace. Empty: not recorded.
   std::vector<double> force_N;
-  // Names of the object's organs or materials, and for each row the index of the one that the tool touches.
-  // Empty if the object has only one.
+  // parts: names of the object's organs or materials; empty if there is only one. touched_part: for each row,
+  // the index of the part that the tool touches.
   std::vector<std::string> parts{};
   std::vector<std::uint8_t> touched_part{};
 };
 
-// The objects of a trace. For a soft object of several materials, also the material beneath the tool in each
-// tick. It is that of the surface at rest nearest to the proxy, looked up every few ticks.
+// The objects of a trace. If a soft object has several materials, the result also has the material beneath
+// the tool in each tick. This is the material of the vertex nearest to the proxy, on the surface at rest. It
+// is looked up every few ticks.
 std::vector<PlottedObject> plotted_objects(const DrawnScene& scene, std::span<const TraceRow> rows,
                                            const std::vector<std::vector<double>>& force_N);
 

@@ -22,8 +22,8 @@ constexpr double lane_height = 22.0;
 constexpr std::size_t most_lanes = 24;
 constexpr double kTitleLetter = 7.9;  // pixels; upper estimate of a bold letter's mean width at font size 13
 constexpr double kEntryGap = 6.0;     // between entries of a legend (pixels)
-constexpr double kRounding = 1e-6;    // pixels; a line may end so far beyond the end of its axis
-constexpr int kTicks = 10;            // ticks of an x axis, about
+constexpr double kRounding = 1e-6;    // pixels; a line may reach this far beyond the end of its axis
+constexpr int kTicks = 10;            // approximate number of ticks of an x axis
 constexpr double kTickGap = 8.0;      // between the axis and the text of a tick (pixels)
 constexpr const char* kSqueezedColour = "#ececec";
 

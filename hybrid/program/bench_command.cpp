@@ -183,7 +183,8 @@ void threads_suite(const BenchCommand& command, std::FILE* words, nlohmann::orde
   for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
 }
 
-// Does the suite have anything to do? In "all" it is left out if every chosen name belongs to other suites.
+// Does the suite have anything to do? In "all" a suite is left out if every chosen name belongs to other
+// suites.
 bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
               const std::vector<std::string>& engines) {
   return (command.only.empty() || !chosen_in_suite(command.only, cases).empty()) &&
@@ -253,7 +254,7 @@ std::string bench_mesh_error(const std::string& name) {
 
 namespace {
 
-// What a suite knows by name.
+// The names that may be chosen in a suite: its parts and its engines.
 struct SuiteNames {
   const char* suite;
   std::vector<std::string> parts, engines;
@@ -264,7 +265,8 @@ std::vector<SuiteNames> suite_names() {
           {"occupancy", bench::occupancy_cases(), names_of(bench::kOccupancyEngines)}};
 }
 
-// Refuses chosen names that have an effect in none of the suites that run, and says what these know.
+// Refuses chosen names that have no effect in any of the suites that run. The message lists the names that
+// these suites have.
 void refuse_names_without_effect(const BenchCommand& command) {
   std::vector<std::string> parts, engines;
   for (const SuiteNames& names : suite_names()) {
@@ -282,12 +284,13 @@ void refuse_names_without_effect(const BenchCommand& command) {
                       option, name, listed(known)));
     }
   };
-  if (parts.empty()) return;  // nothing runs, which run_suites() refuses
+  if (parts.empty()) return;  // no suite runs; run_suites() refuses the command
   check("--only", command.only, parts);
   check("--engines", command.engines, engines);
 }
 
-// Runs what was asked for into `report`, row by row. Throws std::invalid_argument: there is nothing to run.
+// Runs the chosen suites and adds their rows to `report` one by one. Throws std::invalid_argument if there is
+// nothing to run.
 void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered_json& report) {
   std::FILE* words = outputs.words();
   nlohmann::ordered_json& suites = report["suites"] = nlohmann::ordered_json::object();

@@ -185,8 +185,8 @@ void judge_ranked(ComparedFigure& figure) {
   figure.verdict = enough ? Verdict::noise : Verdict::unknown;
 }
 
-// Judges the figures of a family together. Figures whose values are all equal carry no information, whichever
-// runs are old, so they do not belong to the family.
+// Judges the figures of a family together. Figures whose values are all equal are left out: they carry no
+// information, however the runs are divided into old and new ones.
 void judge_family(Family family, ReportComparison& comparison) {
   std::vector<ComparedFigure*> members;
   std::vector<double> p;

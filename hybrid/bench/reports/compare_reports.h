@@ -17,9 +17,9 @@
 
 namespace hybrid::bench {
 
-// Measured figures are tested in three families, so that the few that users feel need fewer runs than all of
-// them would. `rate` is the share of comparisons of a build with itself in which some figure of the family
-// may be called changed. The rates add up to 5 %.
+// Measured figures are tested in three families. Users feel only a few figures. Those have families of their
+// own, because a small family needs fewer runs. `rate` is the share of comparisons of a build with itself in
+// which some figure of the family may be called changed. The rates add up to 5 %.
 enum class Family : std::uint8_t {
   overall,  // geometric mean of a figure over the product's rows in a suite
   felt,     // median and p99 of a row of the product
@@ -45,7 +45,8 @@ struct ComparedFigure {
   Family family = Family::other;  // only of a ranked figure
   bool ranked = false;            // judged by the rank test; otherwise by equality
   std::size_t rank = 0;           // place of its key among the keys of the suite
-  double noticed = 0.0;  // change over the least that a user notices: a tick's period, or a second of waiting
+  double noticed =
+      0.0;  // change / least change that a user notices (a tick's period, or a second of waiting)
   // The values of all runs. In a ranked figure null stands for infinity: it was never reached.
   std::vector<nlohmann::ordered_json> old_values, new_values;
   std::optional<Quartiles> old_spread, new_spread;  // only of ranked figures

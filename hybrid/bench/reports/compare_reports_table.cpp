@@ -10,9 +10,9 @@
 namespace hybrid::bench {
 namespace {
 
-// Rows of the table at most, unless all are asked for.
+// Greatest numbers of rows in the table, unless all rows are asked for.
 constexpr std::size_t kMostChanged = 60, kMostUnchanged = 10, kMostRowsOfOne = 20;
-// Values listed for an exact figure that differs between runs, at most.
+// Greatest number of values that are listed for an exact figure that differs between runs.
 constexpr std::size_t kMostValues = 4;
 
 const char* verdict_name(Verdict verdict) {

@@ -14,7 +14,7 @@ struct RankTest {
   // True: over all ways to divide the values between the samples; false: normal approximation.
   bool exact = true;
 };
-// The test is exact if both samples together have at most so many values. Ties are allowed.
+// The test is exact if both samples together have at most this many values. Ties are allowed.
 inline constexpr std::size_t kMostExactValues = 30;
 // Empty samples give p = 1. No value may be NaN.
 RankTest rank_test(std::span<const double> first, std::span<const double> second);
@@ -26,7 +26,7 @@ double least_p(std::size_t first, std::size_t second);
 // The least size of both samples at which least_p() is `p` or less.
 std::size_t size_for(double p);
 
-// For each p, the least false discovery rate at which the procedure rejects it.
+// For each p, the least false discovery rate at which the procedure rejects the hypothesis of that p.
 std::vector<double> benjamini_hochberg(std::span<const double> p);
 
 struct Quartiles {

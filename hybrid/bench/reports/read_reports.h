@@ -21,8 +21,8 @@ struct BenchReport {
 // JSON, no report of `hybrid bench`, or its rows do not match REPORTS.md.
 BenchReport read_bench_report(const std::filesystem::path& file);
 
-// Reads all reports of one side of a comparison. Throws the same errors. Also refuses a file that is given
-// twice, or a copy of one, because it is not a separate run.
+// Reads all reports of one side of a comparison. Throws std::invalid_argument as read_bench_report() does. A
+// file that is given twice, or a copy of one, is also refused, because it is not a separate run.
 std::vector<BenchReport> read_bench_reports(const std::vector<std::filesystem::path>& files);
 
 // The value of a key such as "pose_us.p99", or of a plain key; null if it is missing.
