@@ -59,7 +59,7 @@ struct ForceLimitState {
 // limit by at most the energy of one tick. Never throws, never allocates.
 glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& command_N,
                        const DeviceState& tool, double dt_s) noexcept;
-// For loops without a position: the same without the checks of energy and device faults.
+// For loops without a position: applies all limits but those of energy and device faults.
 glm::dvec3 limit_force(const ForceLimits& limits, ForceLimitState& state, const glm::dvec3& command_N,
                        double dt_s) noexcept;
 

@@ -24,7 +24,7 @@ double sudden_m(const PassivityOptions& options, double dt_s) noexcept {
   return std::max(kLeast_m, options.max_acceleration_m_per_s2 * dt_s * dt_s + options.resolution_m);
 }
 
-// The same for a tool that may move as fast as it did recently, in either direction.
+// Longest step (m) of a tool that may move as fast as it did recently, in either direction.
 double reach_m(const PassivityOptions& options, const PassivityState& state, double dt_s) noexcept {
   return 2.0 * state.stride_m + sudden_m(options, dt_s);
 }

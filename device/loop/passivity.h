@@ -51,7 +51,8 @@ struct PassivityState {
 //     tool is back where the force began, as with a spring. So a wall that the sampled loop cannot hold is
 //     felt as a softer one that it can hold. Before any energy is stored, the force has a small limit.
 //   - given_J > 0: the tool might turn and move as far as the bound allows. The force is limited so that it
-//     would then give no more than worst_tick_J − given_J. It is zero if the tool's last step was along it.
+//     would then give no more than worst_tick_J − given_J. The force is zero if the tool's last step was
+//     along it.
 //   - A reduced share recovers while the tool works against the force, or while no force is commanded.
 //     It does not recover with time alone: a spring that stiffens while it is pressed gives energy.
 // Hannaford & Ryu add a damper instead of reducing the force. A damper needs a division by the speed, which

@@ -19,7 +19,7 @@ std::string_view separator_in_words(Separator separator);
 // ends with one; separators in between belong to it. With Separator::tab, a line without tabs is split at
 // blanks. False: a quotation mark is not closed.
 bool split_fields(std::string_view line, Separator separator, std::vector<std::string_view>& fields);
-// The same for names: a unit in brackets stays with the name before it.
+// Splits a line of column names as split_fields() does. A unit in brackets stays with the name before it.
 bool split_names(std::string_view line, Separator separator, std::vector<std::string_view>& fields);
 // The separator of a row of numbers, judged by the row alone.
 Separator separator_of_numbers(std::string_view line);

@@ -4,8 +4,8 @@
 // Haptic Rendering Systems", Haptics Symposium 2006.
 //
 // The layout of .traj could not be checked against an original file (device/README.md, Replay). Columns
-// without names are in mm, N and s. Their number decides what they are, and a note says so. A header, a
-// comment that names the columns, or `columns` overrides this.
+// without names are in mm, N and s. Their number decides which quantities they hold, and a note says so. A
+// header, a comment that names the columns, or `columns` overrides this.
 #pragma once
 
 #include <cstddef>

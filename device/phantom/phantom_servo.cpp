@@ -215,8 +215,8 @@ void PhantomServo::on_crash(void* servo) noexcept {
   auto& self = *static_cast<PhantomServo*>(servo);
   self.crashed_.store(true);
   if (self.thread_.load() == thread_number()) {
-    // The servo thread itself crashed, perhaps within a frame. This may have no effect, because the driver
-    // sends forces after the callback has returned, and here the callback will not return.
+    // The servo thread itself crashed, perhaps within a frame. The zero force may have no effect, because the
+    // driver sends forces after the callback has returned, and here the callback will not return.
     constexpr std::array<double, 3> kNothing{};
     self.call_.set_doubles(hd::kForce, kNothing.data());
     self.call_.end_frame(self.handle_);

@@ -69,7 +69,8 @@ inline constexpr int kMaxDelayTicks = 64;
 // workspace_m may be infinite).
 std::unique_ptr<HapticDevice> make_simulated_device(const SimulatedDeviceOptions& options,
                                                     std::shared_ptr<const Path> path);
-// The same with the values of a model. The ideal device follows its path, whatever the force and the hand.
+// Makes a simulated device with the values of a model. The ideal device follows its path, whatever the force
+// and the hand.
 std::unique_ptr<HapticDevice> make_simulated_device(DeviceModel model, const HandModel& hand,
                                                     std::shared_ptr<const Path> path);
 

@@ -69,7 +69,7 @@ double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, doubl
   const double lost = most_N * step_s / mechanics_.mass_kg;  // speed lost to friction
   glm::dvec3 along = speed > 0.0 ? motion.velocity_m_per_s / speed : free_end;
   // The direction of friction is implicit, because friction turns a slow motion within much less than a
-  // substep. Let v be the velocity in the middle of the substep, and w the same without friction. Then
+  // substep. Let v be the velocity in the middle of the substep, and w that velocity without friction. Then
   // v = w − ½·lost·v/|v|, so v has the direction of w. A motion slower than `lost` uses the direction at the
   // end instead. A motion that reverses keeps its own direction, and is stopped first.
   const glm::dvec3 middle = speed > lost ? motion.velocity_m_per_s + free_end : free_end;
@@ -100,7 +100,7 @@ double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, doubl
   }
   if (glm::dot(moved.position_m - motion.position_m, along) < 0.0) {
     // The tool oscillates within the substep, and friction in this direction would have done positive work.
-    // So friction instead takes its impulse from the motion at the end.
+    // So the impulse of friction is subtracted from the momentum at the end of the substep.
     time_s = step_s;
     moved = pull.after(step, motion, at_s, kRest);
     const double left = glm::length(moved.velocity_m_per_s);

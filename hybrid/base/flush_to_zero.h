@@ -6,7 +6,7 @@ namespace hybrid {
 
 // Switches flush-to-zero on for the calling thread.
 void set_flush_to_zero() noexcept;
-// Switches it on during the life of the object, for a thread that belongs to a driver.
+// Switches flush-to-zero on during the life of the object, for a thread that belongs to a driver.
 class ScopedFlushToZero {
  public:
   ScopedFlushToZero() noexcept;

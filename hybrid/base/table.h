@@ -28,7 +28,7 @@ class Table {
 
   explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-  // The head. It ends with a line break, and so does line().
+  // The head, with a line break at its end. line() has one, too.
   [[nodiscard]] std::string head() const {
     const auto any = [this](std::size_t n) {
       return std::ranges::any_of(columns_, [n](const Column& c) { return !c.title[n].empty(); });

@@ -28,8 +28,8 @@ constexpr int kSurfaceSmoothing = 6;  // smoothing passes of a soft object's dra
 // Default limit on the number of cells along the scene's longest side. The cells lie in at most 64 bricks at
 // any alignment.
 constexpr double kMostCells = 504.0;
-constexpr double kRigidCells =
-    200.0;  // default limit if nothing is soft; finer cells exclude no more objects
+// Cells along the longest side if nothing is soft. Finer cells exclude no more objects.
+constexpr double kRigidCells = 200.0;
 constexpr std::size_t kMapReserve = 2048;  // spare bricks for motion
 
 struct Box {

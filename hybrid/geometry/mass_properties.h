@@ -26,7 +26,7 @@ MassProperties mass_of_ball(double radius, double density_kg_per_m3);
 MassProperties mass_of_box(const glm::dvec3& size, double density_kg_per_m3);
 MassProperties mass_of_capsule(double radius, double length, double density_kg_per_m3);
 
-// The same shape with another mass.
+// The properties of the same shape with another mass.
 MassProperties with_mass(const MassProperties& properties, double mass_kg);
 
 // Are these possible principal moments of inertia of a rigid body? Each must be positive, and none may exceed

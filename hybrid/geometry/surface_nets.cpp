@@ -142,7 +142,8 @@ struct Net {
   std::vector<Quad> quads;
 };
 
-// (unit: spacing) of a crossing from a voxel centre, where vertices of several cells could meet.
+// Least distance (unit: spacing) of a crossing from a voxel centre, where vertices of several cells could
+// meet.
 constexpr double kLeastCrossing = 0.01;
 
 class NetBuilder {
@@ -194,8 +195,8 @@ class NetBuilder {
     return corners;
   }
 
-  // Consider two cells that share an ambiguous face, each with one sheet through both diagonals. They would
-  // give an edge with four triangles. Joining the solids across that face splits the sheet in both cells
+  // Two cells may share an ambiguous face, each with one sheet through both diagonals. Together they would
+  // make an edge with four triangles. Joining the solids across that face splits the sheet in both cells
   // (Wenger 2013, 'Isosurfaces', 3.3).
   [[nodiscard]] Sheets sheets_of(unsigned corners, int i, int j, int k) const {
     const CellTables& tables = cell_tables();
@@ -246,7 +247,8 @@ class NetBuilder {
       net_.cells.push_back({i, j, k});
     }
     // The lattice edges from corner 0. Each has four cells around it, and this cell is the last of them.
-    const std::array<std::size_t, 3> step{1, row_length_, 0};  // along z the step is to the layer below
+    // To the neighbour before along each axis. Along z it is 0, because that neighbour is in below_.
+    const std::array<std::size_t, 3> step{1, row_length_, 0};
     for (int axis = 0; axis < 3; ++axis) {
       if (solid(corners, 0) == solid(corners, 1 << axis)) continue;
       const auto vertex = [&](int back_u, int back_v) {

@@ -22,9 +22,9 @@ struct IntensityRange {
 // follow `smoothing` constrained smoothing passes, in which a vertex stays within its cell.
 polygon::TriangleMesh surface_from_labels(const voxel::LabelVolume& volume, int smoothing);
 
-// The same surface, but its vertices begin where the intensity passes an end of the range, linearly between
-// two voxel centres, and not half way. So a scan's surface lies between its voxels. Where the labels differ
-// from the range (pieces that were dropped, cavities that were filled), half way is taken.
+// As surface_from_labels(), but a vertex starts where the intensity, linear between two voxel centres, passes
+// an end of the range. So a scan's surface lies between its voxels. Where the labels differ from the range
+// (pieces that were dropped, cavities that were filled), the vertex starts half way.
 polygon::TriangleMesh surface_from_intensities(const voxel::LabelVolume& volume, const IntensityRange& range,
                                                int smoothing);
 

@@ -28,8 +28,8 @@ struct BlackBoxRow {
 };
 
 // A ring of rows, allocated in the constructor. add() allocates nothing and never waits, so the servo thread
-// may call it. At the first fault (of the device, of a tick, or a non-finite number) it goes on recording for
-// a quarter of its length and then stops. So it holds the ticks before the fault and those after it.
+// may call it. A fault is a device's or a tick's, or a number that is not finite. After the first fault the
+// ring takes rows for a quarter of its length and then stops, so it holds ticks before and after the fault.
 class BlackBox {
  public:
   static constexpr double kSeconds = 2.0;
@@ -43,7 +43,7 @@ class BlackBox {
   // Writes one row a tick. Columns: t_s, x_m, y_m, z_m (the position that was used: the file can serve as the
   // path of a scene), said_*_m (the position that the device reported), proxy_*_m, force_*_N, rigid_N,
   // soft_N, contacts, device_fault, faults, nonfinite, late_us, tick_us, and a time for each stage. Returns
-  // false when not all was written. Async-signal-safe.
+  // false if a part could not be written. Async-signal-safe.
   bool write_to(int descriptor) const noexcept;
 
  private:
@@ -78,9 +78,9 @@ class BlackBoxFile {
   device::OnCrash on_crash_;
 };
 
-// Opens the black box of a session that cannot be run again. The file is `asked`. If `asked` is empty and the
-// session is `live`, it is SCENE-fault.csv in the current folder. Otherwise returns null: the session can be
-// run again.
+// Opens the file of a session's black box: `asked`, or SCENE-fault.csv in the current folder if `asked` is
+// empty and the session is `live`. Returns null if `asked` is empty and the session is not live, because such
+// a session can be run again.
 std::unique_ptr<BlackBoxFile> open_black_box_file(const std::filesystem::path& asked,
                                                   const std::filesystem::path& scene, bool live,
                                                   double rate_hz);

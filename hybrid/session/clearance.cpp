@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-// Unit: spacings. At a greater distance the half-space's distance is exact enough.
+// Distance from the surface (unit: spacings) beyond which the distance to the half-space is used.
 constexpr double kExactWithin = 1.0;
 
 // Distance from a voxel's ball to the rigid surfaces themselves, not to their half-spaces; at most `range_m`.

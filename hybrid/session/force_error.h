@@ -39,15 +39,14 @@ struct ForceError {
   ErrorRange all, moving, still;  // moving: the device is faster than kStill_m_per_s
   double p99_N = 0.0, p99_jnd = 0.0;
   std::string not_measured;  // why no tick was compared, in words; empty if any tick was
-  // From this time after the device stopped on, every still tick is within 1 JND. Empty if there is no such
-  // time.
+  // Time after the stop of the device from which every still tick is within 1 JND. Empty if there is none.
   std::optional<double> within_after_s;
 };
 
 struct SlowRunOptions {
   double dt_s = 1e-3;
   double floor_N = 0.04;  // lower bound of the JND (N)
-  int most = 0;           // number of compared ticks at most, evenly spread; set to at least 1
+  int most = 0;           // greatest number of compared ticks, evenly spread; set it to at least 1
   bool async_relaxation = false;
   std::function<void(const std::string&)> progress;  // may be empty
   int slower = kSlower;                              // slow-down factor; at least 1

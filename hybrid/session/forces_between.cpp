@@ -15,8 +15,8 @@ namespace {
 
 using Kind = ObjectPair::Kind;
 
-// Links at their limits carry a load that only the balance of forces can confirm. The balance must close to
-// kBalanced times the largest force, or to kBalanced_N.
+// The load of links at their limits is known only if the forces on the object balance. Their sum may be at
+// most kBalanced times the largest force, or kBalanced_N.
 constexpr double kBalanced = 0.01, kBalanced_N = 1e-4;
 // The surface of a half-space is looked for up to this share of the spacing beyond the voxel's ball.
 constexpr double kLookBeyond = 0.5;

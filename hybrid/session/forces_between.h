@@ -25,10 +25,10 @@ struct PairForce {
   // Force of the other object on the soft one (scene's frame). It is empty in three cases, in which the state
   // does not determine it:
   // - links at their limits tie both the other object and a third one to the same voxels;
-  // - such links carry loads, and the forces on the tissue do not balance;
+  // - links at their limits carry loads, and the forces on the tissue do not balance;
   // - an object has rigid blocks.
   std::optional<glm::dvec3> on_soft_N;
-  bool through_limits = false;  // links at their limits may carry a part of it
+  bool through_limits = false;  // links at their limits may carry a part of the force
 };
 
 // All forces on a soft object from outside the object.

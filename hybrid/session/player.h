@@ -20,7 +20,7 @@ namespace hybrid {
 // that happens once is a counter.
 struct PlayRequest {
   bool dragging = false, paused = false;
-  bool hold = false;               // as paused, and no edit is taken: the window's thread may read the state
+  bool hold = false;               // pauses and takes no edit, so that the window's thread may read the state
   double speed = 1.0;              // simulated time over real time, 0 to 1; always 1 with a real device
   std::uint32_t restarts = 0;      // counts restarts of the hand's path
   std::uint32_t single_ticks = 0;  // counts single steps while paused

@@ -51,7 +51,7 @@ bool is_edit(const Edit& edit) {
   return static_cast<std::uint32_t>(edit.quantity) < kEditedQuantities && std::isfinite(edit.value);
 }
 
-constexpr std::size_t kLongestPath = 4096;  // in messages, as of the system (PATH_MAX)
+constexpr std::size_t kLongestPath = 4096;  // of a scene, in bytes; the system's PATH_MAX
 
 // Of a servo loop (unit: second): 1 MHz to 1 Hz, far beyond the rates that scenes and drivers have.
 constexpr double kLeastPeriod_s = 1e-6, kMostPeriod_s = 1.0;

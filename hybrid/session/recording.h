@@ -25,8 +25,8 @@ struct Recording {
   std::vector<Edit> edits{};  // in order of their ticks
 };
 
-// Both throw std::runtime_error in words. Causes: not writable; not a recording, truncated, or of another
-// version.
+// save_recording() throws std::runtime_error if the file cannot be written, load_recording() if it is no
+// recording, truncated, or of another version.
 void save_recording(const std::filesystem::path& file, const Recording& recording);
 Recording load_recording(const std::filesystem::path& file);
 

@@ -24,9 +24,9 @@ struct EditedText {
 };
 
 // Returns the text with every value that differs from the scene's. A key that the scene lacks is added below
-// the header of its table. Not written are values of objects that are no [[rigid]] table with a name. Nor are
-// stiffness factors of tissue, because objects may share a material. `unit_m`: length unit of the scene's
-// numbers. `file` is used in messages. Throws SceneError if `text` is no TOML.
+// the header of its table. Two kinds of value are not written: those of objects without a named [[rigid]]
+// table, and stiffness factors of tissue, because objects may share a material. `unit_m`: length unit of the
+// scene's numbers. `file` is used in messages. Throws SceneError if `text` is no TOML.
 [[nodiscard]] EditedText write_values(const std::string& text, const std::filesystem::path& file,
                                       double unit_m, std::span<const ValueInScene> values);
 

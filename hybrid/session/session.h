@@ -51,11 +51,11 @@ struct SessionOptions {
   // Keep every input (48 bytes a tick). With neither inputs nor rows, memory does not grow.
   bool keep_recording = true;
   bool keep_clearance = false;  // keep distances between objects, at about a thousand moments
-  // The forces between objects are computed at so many moments at most, evenly spread, and at the end. In
-  // real time they are computed only at the end.
+  // Greatest number of moments, evenly spread, at which the forces between objects are computed. They are
+  // also computed at the end; in real time, only there.
   int between_samples = 0;
   bool keep_picture = false;  // keep the snapshot with the most contact
-  // The forces of so many ticks at most, evenly spread, are compared with those of a slow run
+  // Greatest number of ticks, evenly spread, whose forces are compared with those of a slow run
   // (force_error.h). The slow run takes up to kSlower times as long as the session. In real time nothing is
   // compared.
   int reference_samples = 0;

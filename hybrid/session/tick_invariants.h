@@ -57,12 +57,12 @@ class TickInvariants {
   [[nodiscard]] double tolerance_J() const;
   // Sum over the ticks of the absolute work and of the coupling's stored energy.
   [[nodiscard]] double moved_J() const { return moved_J_; }
-  [[nodiscard]] double given_J() const { return given_J_; }  // work on the hand, by the end
+  [[nodiscard]] double given_J() const { return given_J_; }  // work on the hand, summed over all ticks
   // The largest value of given_J() so far, and the largest work of a single tick. They serve to compare runs
   // with and without a passivity controller.
   [[nodiscard]] double most_given_J() const { return most_given_J_; }
   [[nodiscard]] double worst_tick_J() const { return worst_tick_J_; }
-  [[nodiscard]] double allowed_J() const { return allowed_J_; }  // by the end
+  [[nodiscard]] double allowed_J() const { return allowed_J_; }  // summed over all ticks
   // Largest depth of the proxy's ball in a rigid object (m).
   [[nodiscard]] double inside_m() const { return inside_m_; }
   [[nodiscard]] double slowest_us() const { return slowest_us_; }

@@ -13,8 +13,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxWaysAside =
-    8;  // limit on attempts to move the proxy aside when a body pushes it into another
+// Greatest number of attempts to move the proxy aside when a body pushes it into another body.
+constexpr int kMaxWaysAside = 8;
 // A body rests after kRestTicks ticks in which it moves no further than kRestMotion (spacings) and the change
 // of force and the unbalanced force stay below kRestForce of the load. A resting body wakes when it exceeds
 // kWakeFactor times these bounds.
