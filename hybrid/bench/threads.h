@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "hybrid/build/build_world.h"
 #include "hybrid/base/histogram.h"
+#include "hybrid/build/build_world.h"
 
 namespace hybrid::bench {
 

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hybrid/base/whole_file.h"
 #include "hybrid/base/letters.h"
+#include "hybrid/base/whole_file.h"
 #include "hybrid/plot/svg_canvas.h"
 #include "hybrid/plot/svg_figure.h"
 
