@@ -79,8 +79,8 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Adds to the links between voxels the excess stiffness of tissue that is too thin to fill a cell
-// (LinkParts::thin). Coarse levels know cells only: on them thin tissue moves with the tissue beside it.
+// Adds to links between voxels that have no cell of tissue round them: of sheets and rows of single voxels
+// (LinkParts::thin). Coarse levels have no such links; there thin tissue moves with the tissue beside it.
 void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& weight,
                                     bool all_alike) noexcept {
   const auto& nodes = level.nodes;
@@ -111,7 +111,7 @@ void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& w
           const float own = stiffness(std::min(here[v], next[d]));
           float& w = weight[d][node + index(i)];
           const bool is_link = (d == 0 ? i + 1 < nx : d == 1 ? j + 1 < ny : k + 1 < nz);
-          if (is_link && w < own) w += thin_excess(v, d, index(wide), stiffness);
+          if (is_link && w == 0.0F && own > 0.0F) w += thin_excess(v, d, index(wide), stiffness);
         }
       }
     }

@@ -2,11 +2,13 @@
 // Decides which objects can be solved on a CompositeGrid: by their materials and anchors, and by trial
 // contacts.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 
 #include "voxel/composite/grid.h"
+#include "voxel/lattice/link_stiffness.h"
 
 namespace voxel {
 namespace {
@@ -21,6 +23,48 @@ constexpr double kMaxForceError = 0.14;
 // Forces are scaled to a press as deep as this share of the object's smallest side. Errors are relative to
 // the force, or to 0.57 N if the force is smaller: 7 % of 0.57 N is 0.04 N, which a hand does not feel.
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
+constexpr double kMaxThinShare = 0.02;  // of the stiffness of links at surfaces and where tissues meet
+
+// At surfaces and where tissues meet: share of the links' stiffness that belongs to tissue too thin to have a
+// cell of its own stiffness (LinkParts::thin). Coarse levels know cells only. Samples kRowsTried rows at
+// most.
+double thin_tissue_share(const Lattice& lattice) {
+  constexpr RowId kRowsTried = 20000;
+  const Grid& g = lattice.grid();
+  RowId among = 0;
+  for (RowId row = 0; row < g.rows(); ++row) among += lattice.filled_in(row) > 0 && lattice.inside(row) == 0;
+  const RowId every = among / kRowsTried + 1;
+  double thin = 0.0, all = 0.0;
+  RowId number = 0;
+  const auto moduli_at = [&](const std::array<int, 3>& c) {
+    const std::uint8_t material = lattice.material(lattice.at(c[0], c[1], c[2]));
+    if (material == 0) return LinkModuli{};
+    const double young_Pa = lattice.materials()[material].young_Pa;
+    return LinkModuli{young_Pa, young_Pa};
+  };
+  for (RowId row = 0; row < g.rows(); ++row) {
+    if (lattice.filled_in(row) == 0 || lattice.inside(row) != 0 || number++ % every != 0) continue;
+    for (std::uint32_t lanes = lattice.filled_lanes(row); lanes != 0; lanes &= lanes - 1) {
+      const VoxelId v = row * kRow + static_cast<VoxelId>(std::countr_zero(lanes));
+      for (std::size_t d = 0; d < 3; ++d) {
+        if (!lattice.filled(lattice.up(v, static_cast<int>(d)))) continue;
+        std::array<LinkModuli, 9> links;
+        for (int n = 0; n < 9; ++n) {
+          auto from = lattice.coordinates(v);
+          from[(d + 1) % 3] += n % 3 - 1;
+          from[(d + 2) % 3] += n / 3 - 1;
+          auto to = from;
+          ++to[d];
+          links[index(n)] = softer(moduli_at(from), moduli_at(to));
+        }
+        const LinkParts parts = link_parts(links);
+        thin += parts.thin.along_Pa;
+        all += parts.thin.along_Pa + parts.cells.along_Pa;
+      }
+    }
+  }
+  return all > 0.0 ? thin / all : 0.0;
+}
 
 // The axis direction nearest to the inward normal. For a sheet one voxel thick, which has no such normal: the
 // direction across the sheet.
@@ -51,6 +95,7 @@ CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
     const LinkLimit& l = lattice.tightest(d);
     if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return {"its links have no slack"};
   }
+  if (thin_tissue_share(lattice) > kMaxThinShare) return {"much of it is one voxel thick"};
   return CompositeGrid(lattice, kTrialHalfWidth).try_contacts();
 }
 
