@@ -55,7 +55,7 @@ void add_finding(Json& file, const polygon::Finding& f) {
   file["findings"].push_back(to_json(f));
 }
 
-// A mesh's finding with its count before the text, which is worded to follow it.
+// A finding of a mesh as JSON. Its text begins with the count, because it is worded to follow one.
 Json counted(polygon::Finding f) {
   f.text = fmt::format("{} {}", f.count, f.text);
   return to_json(f);

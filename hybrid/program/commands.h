@@ -28,7 +28,8 @@ struct RunCommand {
   std::string device;       // replaces the scene's device; empty: the scene's
   int samples = 1'000'000;  // ticks whose force is compared with a slow run; by default all
   std::uint64_t start_ticks = 0;
-  std::string relaxation = "apart";  // or "tick": where tissue away from the contact is relaxed
+  // Where tissue away from the contact is relaxed: "apart" (on a thread of its own) or "tick".
+  std::string relaxation = "apart";
   std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
   std::filesystem::path black_box;  // empty: see open_black_box_file()
   ReportRequest report;
@@ -65,7 +66,7 @@ int devices(const DevicesCommand& command);
 
 struct CompareCommand {
   std::vector<std::filesystem::path> scenes;  // one: an object of it by several models; more: whole scenes
-  int samples = 1'000'000;                    // only of whole scenes; as of `run`
+  int samples = 1'000'000;                    // only for whole scenes; as in RunCommand
   std::string object;                         // empty: the first suitable object
   MeasuredOptions measured;                   // empty file: no measurement
   std::filesystem::path plot;
@@ -107,7 +108,7 @@ int run_bench(const BenchCommand& command);
 const std::vector<std::string>& bench_suites();
 std::vector<std::string> bench_parts();  // paths of rigid, cases of soft and occupancy
 std::vector<std::string> bench_engines();
-std::string bench_mesh_error(const std::string& name);  // empty if the name is a mesh's or a path
+std::string bench_mesh_error(const std::string& name);  // empty if the name is that of a mesh or is a path
 // The suites in which each option has an effect. Options that have an effect in all suites are not listed.
 struct BenchOption {
   const char* name;

@@ -47,7 +47,8 @@ PageTable models_table(const Comparison& comparison) {
   return table;
 }
 
-// Models whose p99 of the difference is within 1 JND, or those where it is not: "a (0.4 JND), b (2 JND)".
+// The models whose p99 of the difference is within 1 JND, or (`within` false) all others, for example "a (0.4
+// JND), b (0.8 JND)".
 std::string models_within(const Comparison& comparison, bool within) {
   std::string list;
   for (std::size_t m = 0; m < comparison.models.size(); ++m) {

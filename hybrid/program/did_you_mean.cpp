@@ -11,7 +11,7 @@
 namespace hybrid {
 namespace {
 
-// Empty where nothing is near.
+// The most similar name; empty if none is similar.
 std::string nearest(const std::string& word, const std::vector<std::string>& names) {
   const std::vector<std::string_view> views(names.begin(), names.end());
   const std::string_view found = nearest_name(word, views);

@@ -13,8 +13,8 @@ namespace hybrid {
 // A line that suggests the command or option that was probably meant; empty if no name is similar.
 std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& arguments);
 
-// Why a name is refused that is none of `known`: the nearest of them, if one is near, and all; empty if it is
-// one.
+// A message that refuses a name which is not in `known`. It suggests the most similar known name, if one is
+// similar, and lists all. Empty if `known` has the name.
 std::string unknown_name(const std::string& name, const std::vector<std::string>& known);
 
 }  // namespace hybrid

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The output files of a command. Files that cannot be written are refused before the work. After it each file
-// is written independently of the others, and its name is printed. Also the end of a command that a signal
-// stopped.
+// The output files of a command. Files that cannot be written are refused before the work begins. When the
+// work is done, each file is written independently of the others, and its name is printed. Also prints the
+// last words of a command that a signal stopped.
 #pragma once
 
 #include <cstdio>

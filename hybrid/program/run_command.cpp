@@ -28,7 +28,7 @@
 namespace hybrid {
 namespace {
 
-// Moments of a session at which the forces between objects are computed, at most.
+// Greatest number of moments of a session at which the forces between objects are computed.
 constexpr int kBetweenSamples = 200;
 
 bool& progress_shown() {

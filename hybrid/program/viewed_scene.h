@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene with all that is needed to show and play it in a window, and reloading it while another one is
-// played.
+// A scene with all that is needed to show and play it in a window. SceneReload loads the scene again while
+// the old one is played.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Stability and buzz, measured: a hand presses, a knock follows, and the motion of the tool is watched.
+// Measures stability and buzz: a hand presses, a knock follows, and the motion of the tool is recorded.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,12 +19,12 @@ namespace {
 
 constexpr double kSoftestWall_N_per_m = 20.0, kStiffestWall_N_per_m = 1e7;
 constexpr double kSoftestBuzz_N_per_m = 100.0;
-constexpr double kDeepest_m = 2e-3;  // depth of a press at most; so a soft wall is pressed less hard
+constexpr double kDeepest_m = 2e-3;  // greatest depth of a press; so the force on a soft wall is smaller
 constexpr double kPressing_s = 0.3;  // time in which the hand presses
-constexpr double kSettling_s = 0.2;  // time in which the loop settles after that
+constexpr double kSettling_s = 0.2;  // time in which the loop settles after the press
 // Periods of an undamped oscillation in a block, over which the envelope is measured.
 constexpr double kBlockPeriods = 40.0;
-constexpr double kMostBlock_s = 1.0;  // length of a block at most
+constexpr double kMostBlock_s = 1.0;  // greatest length of a block
 
 }  // namespace
 
@@ -92,7 +92,7 @@ void HeldLoop::settle() {
 }
 
 void HeldLoop::knock(double amplitude_m) {
-  // N·s; of an undamped oscillator with this amplitude
+  // Impulse (N·s) that gives an undamped oscillator this amplitude.
   const double impulse = amplitude_m * std::sqrt(stiffness_ * held_loop(setting_).mass_kg);
   const double ticks = std::max(1.0, std::ceil(impulse / (scene_.press_N() * setting_.period_s())));
   for (int n = 0; n < static_cast<int>(ticks); ++n) step(impulse / (ticks * setting_.period_s()));
@@ -154,8 +154,8 @@ void watch_knock(PressedScene& scene, const LoopSetting& setting, double stiffne
   for (int k = 0; k < kLook_s * setting.rate_hz; ++k) depth_m.push_back(loop.step());
 }
 
-// The presses with which a stiffness is tried. With an encoder there are several within one of its steps. The
-// reason is that the hand's target between two steps decides whether friction holds the tool.
+// The forces with which a stiffness is tried (N). With an encoder, they hold the hand's target at several
+// places between two encoder steps, because this place decides whether friction holds the tool.
 std::vector<double> presses(const PressedScene& scene, const LoopSetting& setting, double stiffness) {
   const double press = press_for(scene, stiffness), step_N = stiffness * setting.encoder_m();
   if (!(step_N > 0.0)) return {press};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Passivity, measured: sinusoids drive the wall, and its energy is counted.
+// Measures passivity: the wall is driven by sinusoids, and the energy that it gives out is summed.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -30,8 +30,8 @@ CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenM
     const double seen = step > 0.0 ? std::round(depth / step) * step : depth;
     return glm::dot(scene.tick({.position_m = scene.at_depth(seen)}, dt).force_N, scene.normal());
   };
-  // The wall's memory must first reach its steady state: that of the velocity's estimate, or that of the
-  // account of its damping.
+  // The wall remembers past ticks: in the estimate of the velocity, or in the account of its damping. This
+  // memory must first reach its steady state.
   const int settle =
       setting.delay_ticks +
       (setting.damping_account ? static_cast<int>(std::ceil(10.0 * kDampingMemory_s / dt)) : kRateMemory);
@@ -68,7 +68,7 @@ std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& 
   for (const double in_steps : {1.0 / 64, 1.0 / 8, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 64.0}) {
     const double amplitude = in_steps * step;
     if (amplitude > 0.9 * deep && !all.empty()) break;
-    // In encoder steps: where the depth rounds to a step, and between.
+    // Places in encoder steps: where the depth rounds to a step, and between two steps.
     for (const double place : {0.0, 0.25, 0.5}) {
       const double centre = (std::floor(deep / step) + place) * step;
       for (const int cycles : {1, 2, 3, 4, 5, 6, 7, 8}) {

@@ -24,10 +24,10 @@ struct LoopSetting {
   double rate_hz = 1000.0;
   int delay_ticks = 0;                  // from sample to force, in ticks
   double wall_damping_N_s_per_m = 0.0;  // B; of every rigid surface
-  // World::damping_account, which keeps B passive; theory has B without it.
+  // World::damping_account, which keeps B passive. The theory has B without this account.
   bool damping_account = false;
 
-  // Stiffness of the spring with which a hand without one presses.
+  // If `hand` has no spring, the tool is pressed by a spring of this stiffness.
   static constexpr double kNoHand_N_per_m = 1.0;
   // Mass of the Premium; no friction, no encoder step, no force limit. Theory covers this mechanism.
   static device::Mechanism linear_mechanism();
@@ -89,9 +89,10 @@ struct CycleEnergy {          // of one period of the motion in its steady state
 CycleEnergy drive(PressedScene& scene, const LoopSetting& setting, const DrivenMotion& motion);
 
 // The largest stiffness of the coupling (N/m) at which no motion of a fine grid gets more energy out of the
-// wall than the mechanism dissipates. Found by bisection to 0.1 %. The grid has all frequencies up to
-// Nyquist's. With an encoder step it also has amplitudes from 1/64 of the step on, and several places within
-// the step. 0: even the softest (1 N/m) is not passive. Empty: passive at all up to 10 MN/m.
+// wall than the mechanism dissipates. Found by bisection to 0.1 %. The grid has all frequencies up to the
+// Nyquist frequency. With an encoder step it also has amplitudes from 1/64 of the step on, and several places
+// within the step. The result is 0 if even 1 N/m is not passive, and empty if all stiffnesses up to 10 MN/m
+// are passive.
 std::optional<double> measured_passive_stiffness(PressedScene& scene, const LoopSetting& setting);
 
 // ---- stability --------------------------------------------------------------------------------------------
@@ -120,12 +121,13 @@ class HeldLoop {
   std::unique_ptr<device::HapticDevice> device_;
 };
 
-// The largest stiffness of the coupling (N/m) at which a knock dies out. For a linear loop (no friction, no
-// encoder) the sign of the envelope's growth rate decides, far from all limits. The bisection ends at 0.1 %.
-// Otherwise the tool must come to rest after the knock, at several presses within one encoder step.
-// Stiffnesses 1.3 apart are tried until it does not, then a bisection ends at 0.5 %. 0: not even the softest
-// is stable (20 N/m, or the one at which ten times the friction presses 2 mm deep). Empty: stable at all up
-// to 10 MN/m.
+// The largest stiffness of the coupling (N/m) at which a knock dies out. The result is 0 if even the softest
+// stiffness is not stable, and empty if all stiffnesses up to 10 MN/m are stable.
+//   Linear loop (no friction, no encoder): the sign of the growth rate of the envelope decides, far from all
+//   limits. The bisection ends at 0.1 %. The softest stiffness is 20 N/m.
+//   Other loops: the tool must come to rest after the knock, at several presses within one encoder step.
+//   Stiffnesses are raised by factors of 1.3 until it does not; then a bisection ends at 0.5 %. The softest
+//   stiffness is 20 N/m, or that at which ten times the friction presses 2 mm deep if it is larger.
 std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting);
 
 // Growth rate (1/s) of a knock's envelope in a linear loop. +infinity if it left the linear range, −infinity
@@ -134,8 +136,8 @@ double envelope_growth(PressedScene& scene, const LoopSetting& setting, double s
 
 // ---- buzz -------------------------------------------------------------------------------------------------
 
-// The vibration of the tool that is felt most, over half a second, a second after a knock on a steady press.
-// It is the worst of several presses within one encoder step.
+// The vibration of the tool that is felt most. It is recorded for half a second, from one second after a
+// knock on a steady press. The result is the worst of several presses within one encoder step.
 Vibration pressed_vibration(PressedScene& scene, const LoopSetting& setting, double stiffness_N_per_m);
 
 // The stiffness of the coupling at which a steady press begins to buzz, that is to vibrate so that a hand

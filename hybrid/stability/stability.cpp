@@ -87,9 +87,10 @@ class Plan {
     curves();
   }
 
-  // Two measurements: the stiffness that buzzes at a given modulus, and the modulus that buzzes under a stiff
-  // coupling. The second is needed because tissue is in series with the coupling: on very soft tissue no
-  // coupling buzzes. The modulus is that of the first soft object; the others keep their ratio to it.
+  // Two measurements: the stiffness of the coupling that buzzes at a given modulus, and the modulus that
+  // buzzes under a stiff coupling. The second is needed because tissue and coupling are in series: on very
+  // soft tissue no coupling buzzes. The modulus is that of the first soft object; the other objects keep
+  // their ratio to it.
   void soft() {
     constexpr double kStiffCoupling_N_per_m = 20e3;
     for (const double young : {1e3, 1e4, 1e5}) {

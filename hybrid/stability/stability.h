@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boundaries up to which the haptic loop of a scene is stable, passive and free of buzz: measured, beside
-// theory.
+// Boundaries up to which the haptic loop of a scene is stable, passive and free of buzz. They are measured
+// and compared with theory.
 #pragma once
 
 #include <optional>
@@ -32,7 +32,7 @@ struct StabilityRow {
   StabilitySweep sweep = StabilitySweep::damping;
   Boundary kind = Boundary::stable;
   LoopSetting setting;
-  std::string grip = "none", device;  // device: empty where it is no real one's model
+  std::string grip = "none", device;  // device: empty if the mechanism models no real device
   // Stiffness of the virtual coupling (N/m) up to which the loop is stable or passive, or at which buzz
   // begins.
   std::optional<double> measured;  // empty: there is no boundary up to `stiffest`
@@ -40,8 +40,9 @@ struct StabilityRow {
   std::optional<double> theory;       // empty: no theory is exact
   std::optional<double> lower_bound;  // bound that theory guarantees if it is not exact
   std::string theory_name;
-  // Only of tissue. Either young_Pa is set: Young's modulus of the first soft object. Or coupling_N_per_m is
-  // set: then `measured` and `stiffest` are moduli (Pa), and `measured` is the one at which buzz begins.
+  // Only for sweep `tissue`, where exactly one of them is set. young_Pa: modulus of the first soft object;
+  // the stiffness of the coupling is measured. coupling_N_per_m: stiffness of the coupling; the modulus at
+  // which buzz begins is measured, and `measured` and `stiffest` are moduli (Pa).
   std::optional<double> young_Pa, coupling_N_per_m;
   // ---- only of buzz ----
   Vibration vibration;  // at the boundary
@@ -73,10 +74,10 @@ struct StabilityOptions {
   Progress progress{};
 };
 
-// Runs all measurements. With a rigid scene this is the whole plan (two to five minutes; quick: some
-// seconds). With soft objects it is where they begin to buzz: the stiffness of the coupling at Young's moduli
-// of 1, 10 and 100 kPa, and Young's modulus under a stiff coupling. A signal (StopOnSignal) ends it early.
-// Throws SceneError (see PressedScene).
+// Runs all measurements. For a rigid scene this is the whole plan (two to five minutes; quick: some seconds).
+// For a scene with soft objects only buzz is measured: the stiffness of the coupling at which it begins, at
+// moduli of 1, 10 and 100 kPa, and the modulus at which it begins under a stiff coupling. A signal
+// (StopOnSignal) ends the measurement early. Throws SceneError (see PressedScene).
 StabilityReport measure_stability(const Scene& scene, const StabilityOptions& options = {});
 
 // Comparison with theory: the number of rows that have a theory, and the largest error.

@@ -14,7 +14,7 @@ struct DriveCase {
   SceneSetting scene;
   Motion motion = Motion::path;
   std::string setting;   // in words
-  SceneSetting like{};   // for oracle `same`: the scene whose forces it must have
+  SceneSetting like{};   // for oracle `same`: the scene that must give the same forces
   double same_N = -1.0;  // greatest difference of the forces; negative: not compared
 };
 

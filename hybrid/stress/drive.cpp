@@ -176,8 +176,7 @@ glm::dvec3 no_position(std::uint64_t number) noexcept {
 double largest_displacement_m(const WorldState& state) {
   float most = 0.0F;
   for (const auto& object : state.soft) {
-    if (object->patches_in_use() !=
-        nullptr) {  // its displacements are on nested patches, the state is at rest
+    if (object->patches_in_use() != nullptr) {  // then patches hold the displacements, and state() is at rest
       for (const voxel::VoxelId v : object->lattice().surface()) {
         const glm::vec3 u = glm::abs(glm::vec3(object->displacement(v)));
         most = std::max({most, u.x, u.y, u.z});

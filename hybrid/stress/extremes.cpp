@@ -27,12 +27,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Allowed beyond one tick's worst case; rounding of the controller.
+// Allowed on top of one tick's worst case, for rounding in the passivity controller.
 constexpr double kPassiveRounding_J = 1e-7;
 constexpr double kLongTick_us = 250e3;  // processor time; on any machine a longer tick is a hang
 // Share of the spacing; tissue with a smaller displacement is back at rest.
 constexpr double kBack = 0.01;
-constexpr std::size_t kQuickEvery = 7;  // the quick run takes one of so many cases
+constexpr std::size_t kQuickEvery = 7;  // the quick run takes every seventh case
 
 // Has the text the form "…scene.toml:12:8: what; what to do"?
 bool says_where_what_and_remedy(const std::string& text) {
@@ -205,7 +205,8 @@ class Suite {
           fmt::format("{:.3g} N left, of {:.3g}", r.unbalanced_N, r.most_N));
       return;
     }
-    // For 512 voxels a side, the budget decides how much is still to be relaxed.
+    // Relaxing 512 voxels a side takes long, and the budget bounds the work of a tick. So it is enough that
+    // most of the displacement has gone.
     const bool rests =
         c.scene.shape == BlockShape::large ? r.left_moved_m < 0.1 * r.most_moved_m : r.asleep && back;
     say("settled", r.unbalanced_N == 0.0 && rests,
@@ -227,8 +228,8 @@ class Suite {
         fmt::format("forces apart by {:.3g} N of {:.3g} at most", apart, r.most_N));
   }
 
-  // A scene of the user's own is judged only by what holds for any scene. It is unknown where it leaves the
-  // tool and, unless `still`, how its objects move.
+  // A scene of the user's own is judged only by what holds for any scene. Where this scene leaves the tool is
+  // unknown. How its objects move is unknown, too, unless `still`.
   void own_scene() {
     const Scene scene = load_scene(options_.scene);
     const bool still = std::none_of(scene.rigid.begin(), scene.rigid.end(), [](const RigidDescription& d) {

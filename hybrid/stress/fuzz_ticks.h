@@ -11,7 +11,7 @@
 namespace hybrid {
 
 struct FuzzOptions {
-  std::uint64_t ticks = 20'000;  // over all scenes; a little more are run
+  std::uint64_t ticks = 20'000;  // sum over all scenes; slightly more are run
   std::uint64_t seed = 1;
   bool async_relaxation = false;  // as SessionOptions::async_relaxation, by counted work
   std::string only{};             // name of the only scene to run; empty: all scenes
@@ -35,10 +35,11 @@ struct FuzzResult {
 
 // Runs episodes of 1,000 ticks. Positions: a walk over the surfaces in steps of 1e-9 to 1e-2 m, jumps of a
 // metre, NaN, infinities, denormals, and magnitudes of 1e-300 to 1e300. Velocities likewise. dt: 0.1 to 10
-// ms, stalls of up to 100 ms, 0, negative, NaN, infinite. TickInvariants checks each tick. All values
-// must be finite and within the limits. Where this is defined, the tool must be outside rigid objects, and
-// the energy within its account. After each episode the tool is led away, and everything must come to rest
-// without force. Throws std::runtime_error if there is no folder for temporary files.
+// ms, stalls of up to 100 ms, 0, negative, NaN, infinite.
+// TickInvariants checks each tick. All values must be finite and within the limits. Where the scene allows
+// these checks, the tool must be outside rigid objects, and the energy must be within its account. After each
+// episode the tool is led away, and everything must come to rest without force. Throws std::runtime_error if
+// there is no folder for temporary files.
 std::vector<FuzzResult> fuzz_ticks(const FuzzOptions& options);
 
 }  // namespace hybrid

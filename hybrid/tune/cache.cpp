@@ -49,8 +49,8 @@ std::uint64_t hash_of(const fs::path& path) {
   return hash;
 }
 
-// Identifies program and machine. The program counts by the hash of its file, because two builds of one
-// version may give different forces.
+// Identifies program and machine. The program is identified by the hash of its file, because two builds of
+// one version may give different forces.
 std::string program_text() {
   const nlohmann::ordered_json head = report_head("tune");
   return fmt::format("{} {} {:016x}", head.at("version").get<std::string>(),

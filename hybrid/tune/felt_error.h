@@ -19,7 +19,7 @@ struct SettingError {
   }
 };
 
-// `ticks`: only so many ticks from the start count. The JND is that of the reference's force.
+// `ticks`: number of ticks, from the start, that count. The JND is that of the reference's force.
 SettingError felt_error(const ForceCourse& course, const ForceCourse& reference, double floor_N, double dt_s,
                         std::size_t ticks = static_cast<std::size_t>(-1));
 

@@ -39,7 +39,8 @@ Played play_setting(const Scene& scene, const std::vector<std::string>& objects,
 ForceCourse play_slowly(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
                         int slower, const Progress& progress);
 
-// The motion played 1.5 times faster and moved by `offset_m`. No setting was chosen on it.
+// The same motion, 1.5 times faster and moved by `offset_m`. It serves to confirm the choice, because no
+// setting was chosen on it.
 Motion other_motion(const Motion& motion, double rate_hz, const glm::dvec3& offset_m);
 inline constexpr double kOtherSpeed = 1.5;
 

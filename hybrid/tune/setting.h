@@ -55,7 +55,7 @@ Setting own_setting(const std::vector<TunableObject>& objects);
 // edges stay whole numbers of voxels, so that its surfaces stay in place. Scale 1 is the object's own
 // spacing.
 ObjectSetting scaled(const TunableObject& object, double scale);
-// Spacing of the setting over the object's own: geometric mean over the axes; 1 without a spacing.
+// Spacing of the setting divided by that of the object: geometric mean over the axes; 1 without a spacing.
 double scale_of(const TunableObject& object, const ObjectSetting& setting);
 
 // The scene from read_scene() with these values, on an ideal device. All models are decided.

@@ -14,8 +14,9 @@ namespace {
 // Orders of the errors. Spacing: a voxel surface lies within half a spacing of the true one, and the edge of
 // a contact is known to one spacing. Both errors are of first order, for either energy.
 constexpr double kSpacingOrder = 1.0;
-// Slowness: tissue comes to rest by diffusion, so the lag falls with the root of the time. In a press on
-// fine trilinear voxels it was 0.070, 0.048, 0.037 and 0.021 N when played 10, 20, 40 and 80 times slower.
+// Slowness: tissue comes to rest by diffusion, so the lag falls with the square root of the time. In a press
+// on fine trilinear voxels the lag was 0.070, 0.048, 0.037 and 0.021 N when played 10, 20, 40 and 80 times
+// slower.
 constexpr double kRestOrder = 0.5;
 // Ratio of spacings. A smaller ratio would amplify the noise that the grid's position causes.
 constexpr double kCoarser = 2.0;

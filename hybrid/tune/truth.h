@@ -23,13 +23,13 @@ inline constexpr double kAtRest_jnd = 0.5;        // accepted error of a truth f
 inline constexpr int kTruthSlower = 2 * kSlower;  // slow-down factor
 
 struct Truth {
-  std::string words;                       // its spacing and energy, in words
-  std::string key;                         // its part of the keys of cached records
-  Setting setting;                         // with its spacing
-  ForceCourse course;                      // along the scene's motion
-  double ratio = 1.0;                      // spacing of the coarser run, which gives its error, over its own
-  SettingError spacing;                    // estimated error of its spacing
-  SettingError rest;                       // estimated error from playing at a finite speed
+  std::string words;     // its spacing and energy, in words
+  std::string key;       // its part of the keys of cached records
+  Setting setting;       // with its spacing
+  ForceCourse course;    // along the scene's motion
+  double ratio = 1.0;    // spacing of the coarser run (measure_truth()) / spacing of the truth
+  SettingError spacing;  // estimated error due to the spacing
+  SettingError rest;     // estimated error due to playing at a finite speed
   [[nodiscard]] double error_jnd() const;  // sum of both errors, for the kind of ticks where it is larger
 };
 
@@ -38,7 +38,7 @@ struct TruthPlan {
   const Scene& as_read;
   const std::vector<TunableObject>& objects;
   std::vector<std::string> names;  // of the tuned objects
-  double scale = kTruthScale;      // the first spacing that is tried, as a multiple of the own
+  double scale = kTruthScale;      // the first spacing that is tried, as a multiple of the scene's
   double floor_N = 0.04, dt_s = 1e-3;
 };
 

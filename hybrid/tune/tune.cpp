@@ -161,8 +161,8 @@ class Search {
     return evaluation;
   }
 
-  // Two rounds. The first plays a part of the motion with all settings. The second plays the whole motion
-  // with those that no other setting clearly dominates.
+  // Two rounds. The first round plays a part of the motion with all settings. The second plays the whole
+  // motion with the settings that no other setting clearly dominates.
   void try_settings(const std::vector<Setting>& settings) {
     const std::size_t first = trials_.size();
     for (const Setting& setting : settings) {

@@ -68,7 +68,8 @@ TuneResult tune(const Scene& as_read, const TuneOptions& options);
 
 // Settings with one scale and one energy for all objects. The scene's own setting comes first.
 std::vector<Setting> common_settings(const std::vector<TunableObject>& objects, bool quick);
-// Variations of `from` in one object each: one step coarser or finer, with the other energy, or as rigid.
+// Variations of `from` in one object each: one step coarser or finer, with the other energy, or rendered by
+// the proxy.
 std::vector<Setting> settings_beside(const std::vector<TunableObject>& objects, const Setting& from);
 
 }  // namespace hybrid

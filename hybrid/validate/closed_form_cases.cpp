@@ -36,7 +36,8 @@ void add_bar(Energy energy, double poisson, double spacing_m, ValidationReport& 
        .stated = true});
 }
 
-// Tests a cylinder that is bonded at both ends, by its lower half: the middle plane stays flat, and slips.
+// Tests a cylinder that is bonded at both ends. By symmetry its middle plane stays flat and slips, so only
+// the lower half is modelled.
 void add_bonded_disc(double spacing_m, ValidationReport& report) {
   PressedSpecimen half({.shape = Specimen::Shape::cylinder,
                         .size_m = {kSiliconeDiameter_m, kSiliconeDiameter_m, 0.5 * kSiliconeHeight_m},

@@ -13,8 +13,8 @@ namespace {
 
 using Material = FemRow::Material;
 
-// Label of a voxel. One on an interface belongs to the stiffer side, as one on the surface belongs to the
-// object.
+// Label of a voxel. A voxel on an interface belongs to the stiffer side, as a voxel on the surface belongs to
+// the object.
 std::uint8_t label_in(Material material, const glm::dvec3& at) {
   constexpr double e = 1e-9;
   if (material == Material::layers) return at.z > 0.055 + e ? 3 : at.z > 0.04 - e ? 2 : 1;

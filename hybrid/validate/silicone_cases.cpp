@@ -14,8 +14,9 @@ namespace hybrid {
 namespace {
 
 constexpr double kPoisson = 0.49;  // silicone keeps its volume; this is the highest ν that bricks take
-// A linear law that is right at 5 % strain is 5.5 % below an incompressible neo-Hookean law at 10 %. The
-// neo-Hookean law is within 7 % of these materials. So the linear law must be within 13 % at 10 % strain.
+// A linear law that is right at 5 % strain is 5.5 % below an incompressible neo-Hookean law at 10 % strain.
+// These materials are within 7 % of the neo-Hookean law. So the linear law must be within 13 % at 10 %
+// strain.
 constexpr double kBoundAtTen = 0.13;
 
 // % strain; offset between the points of different grades, so that they do not overlap.

@@ -15,7 +15,7 @@ namespace hybrid {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double kNearTools = 3.5;  // half the height of the nearer view, in tool radii
+constexpr double kNearTools = 3.5;  // half of the height that the nearer view covers, in tool radii
 constexpr double kFilled = 0.9;     // share of the view that the scene fills
 
 // Visits every `stride`-th finite vertex of the scene in its present state. The stride bounds the cost for
@@ -193,8 +193,8 @@ Camera frame_scene(const DrawnScene& scene, const Snapshot& snapshot, double asp
   }
   if (polygon::is_finite(snapshot.proxy_m)) add_hidden(scene, snapshot, candidates);
 
-  // Preferred directions: from the side to which the force points, because the tool is there, but oblique, so
-  // that depth shows; a little above the horizon; from the front.
+  // Preferred directions: on the side to which the force points, because the tool is there, but oblique to
+  // the force, so that depth shows. Also a little above the horizon, and from the front.
   const auto cost = [&](const Candidate& candidate) {
     return std::min(candidate.hidden, 1.5) + 0.8 * std::abs(glm::dot(candidate.toward_eye, pushed) - 0.4) +
            0.004 * std::abs(candidate.elevation / degree - 25.0) +

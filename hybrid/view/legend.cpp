@@ -18,9 +18,9 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kMostSingly = 6;  // if more rigid objects are untouched, they share one row
-// Rows of one object's materials at most.
+// Greatest number of rows for the materials of one object.
 constexpr std::size_t kMostMaterials = palette::material.size() + 1;
-constexpr std::size_t kMostStripes = 4;  // colours of one swatch at most
+constexpr std::size_t kMostStripes = 4;  // greatest number of colours of one swatch
 
 std::string and_more(std::size_t count) {
   return "and " + std::to_string(count) + " more";

@@ -21,8 +21,8 @@ void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& s
 // Draws a message at the top of the scene, in as many lines as it needs.
 void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where);
 
-// Draws the column beside the scene: the legend, below it the colours of displacement, and above the inset.
-// Parts without room are left out. Legend rows without room are counted.
+// Draws the column beside the scene: the legend, and below it the colour scale of displacement. Both are
+// above the inset. Parts without room are left out. Legend rows without room are counted in a last row.
 void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                  const OverlayContent& content);
 void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m);

@@ -20,9 +20,9 @@ inline constexpr glm::vec3 dark_tool{0.66F, 0.71F, 0.79F};  // on the dark backg
 inline constexpr glm::vec3 device{0.10F, 0.45F, 0.85F};
 inline constexpr glm::vec3 force{0.03F, 0.38F, 0.93F};
 
-// The scale of displacement, from 0 to its end: viridis (Smith & van der Walt 2015). In viridis equal steps
-// look equal, to colour-blind readers too, and the lightness rises from end to end. Tissue that hardly moved
-// keeps its own colour. Below the share kOwnUntil of the scale there is only the own colour, and from
+// The scale of displacement, from 0 to its end: viridis (Smith & van der Walt 2015). Equal steps of viridis
+// look equal, to colour-blind readers too, and its lightness rises from end to end. Tissue that hardly moved
+// keeps its own colour: up to the share kOwnUntil of the scale only the own colour is drawn, and from
 // kRampFrom on only viridis.
 inline constexpr std::array<glm::vec3, 9> moved{{{0.267F, 0.005F, 0.329F},
                                                  {0.283F, 0.141F, 0.458F},
@@ -61,7 +61,7 @@ inline constexpr std::array<glm::vec3, 10> material{{{0.86F, 0.57F, 0.57F},
 // All materials beyond these share one neutral colour, so that no colour stands for two materials.
 inline constexpr glm::vec3 other_material{0.50F, 0.50F, 0.50F};
 
-// At least so many colours stay for materials, however many colours the scene already has.
+// At least this many colours stay free for materials, however many colours the scene already has.
 inline constexpr std::size_t kLeastFree = 5;
 
 // Colour of object `index`. It is the customary one if the object's name, or that of its material, is in the

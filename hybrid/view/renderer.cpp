@@ -148,8 +148,8 @@ void Renderer::State::draw_object(const Object& object, float alpha) const {
   uniform("clip_plane", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
 }
 
-// Of translucent objects only the nearest surface is blended. A depth-only pass finds it first, so the order
-// of the triangles does not matter.
+// Of translucent objects only the nearest surface is blended. A depth-only pass finds this surface first, so
+// the order of the triangles does not matter.
 void Renderer::State::draw_translucent(const glm::mat4& clip) {
   const auto draw_all = [this] {
     uniform("nearer", 0.0F);
@@ -316,8 +316,9 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
                                               s.bounds.centre_m, radius));
   s.cut_objects(scene, snapshot, camera);
   const glm::vec3 eye(camera.eye_m() - s.origin_m);
-  // Where surfaces coincide, rounding would choose between them pixel by pixel. So a rigid surface is drawn
-  // nearer than tissue by this length. It hides tissue only if it is still nearer than that.
+  // Where surfaces coincide, rounding would choose between them pixel by pixel. So rigid surfaces are drawn
+  // nearer to the eye by this length. A rigid surface counts as hiding tissue only if it is nearer than the
+  // tissue by more than this length.
   const auto apart = static_cast<float>(kDepthApart * camera.view_height_m());
   s.use(s.mesh_program, clip);
   s.uniform("eye", eye);
@@ -390,8 +391,8 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     }
   }
   glDisable(GL_CULL_FACE);
-  // Rigid surfaces in front of soft objects and of the tool: only the nearest is blended. A depth-only pass
-  // finds it.
+  // Rigid surfaces in front of soft objects and of the tool: only the nearest surface is blended. A
+  // depth-only pass finds that surface.
   glDepthMask(GL_TRUE);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   s.use(s.depth_program, clip);

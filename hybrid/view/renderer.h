@@ -35,8 +35,8 @@ class Renderer {
   ~Renderer();
 
   void set_font(const FontAtlas& atlas);
-  // Frees all its objects in the context, which another renderer may go on to use. This one must not draw any
-  // more.
+  // Frees all OpenGL objects of this renderer, which must not draw any more. Another renderer may go on to
+  // use the context.
   void release();
 
   // Sets how the following frames show the scene.

@@ -12,9 +12,9 @@
 namespace hybrid {
 namespace {
 
-// Squares along a voxel's edge, so that slanted borders look straight.
+// Number of squares along a voxel's edge; enough that slanted borders look straight.
 constexpr double kSquaresPerVoxel = 3.0;
-constexpr double kMostSquares = 300.0;  // squares along an edge of the face at most
+constexpr double kMostSquares = 300.0;  // greatest number of squares along an edge of the face
 
 VertexColour bytes_of(const glm::vec3& colour) {
   const glm::vec3 byte = glm::round(255.0F * colour);

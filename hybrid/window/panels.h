@@ -61,11 +61,12 @@ class Panels final : public OverlayPanel {
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
 
   const PanelFrame* frame_ = nullptr;
-  // The scene of bounds_; kept, because the bounds need a look at every vertex.
+  // The scene to which bounds_ belongs. The bounds are kept, because computing them visits every vertex.
   const DrawnScene* bounds_of_ = nullptr;
   SceneBounds bounds_;
   PanelResult result_;
-  // The slider that the user moves, and the value that was last asked for. The session answers a frame later.
+  // The slider that the user moves, and the last value that the panel requested. The session applies it a
+  // frame later.
   std::size_t moved_ = static_cast<std::size_t>(-1);
   float moved_to_ = 0.0F;
 };

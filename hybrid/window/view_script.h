@@ -25,7 +25,7 @@ class ViewScript {
 
   // Plays all actions up to this time that have not been played yet.
   void play(double t_s, Window& window);
-  // Returns the same actions, without a window.
+  // Returns the actions that play() would play, without a window.
   [[nodiscard]] std::vector<ViewAction> due(double t_s);
   [[nodiscard]] std::size_t size() const { return actions_.size(); }
 

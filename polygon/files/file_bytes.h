@@ -9,9 +9,9 @@
 
 namespace polygon {
 
-// Says, for a message, why a file that begins with these bytes is no data file, and what to do. 64 bytes are
-// enough. Empty for a data file. Git LFS leaves pointers in place of files that were not fetched. Servers may
-// send a web page instead of a file.
+// The reason why a file that begins with these bytes is no data file, and the remedy, in words for a message.
+// 64 bytes are enough. Empty for a data file. Git LFS leaves pointers in place of files that were not
+// fetched. Servers may send a web page instead of a file.
 std::string_view other_kind(std::string_view first_bytes);
 
 // `packed`: the file must be gzip. Throws MeshError if the file is missing, not a regular file, unreadable,

@@ -26,7 +26,7 @@ struct PrescannedFile {
   // One per vertex, in file units. Empty for STL, whose vertices come from OpenMesh as floats.
   std::vector<glm::dvec3> coordinates;
   std::size_t faces = 0;  // number of faces that OpenMesh must find
-  // OpenMesh's STL reader drops facets with repeated corners.
+  // True: OpenMesh may find fewer faces. Its STL reader drops facets with repeated corners.
   bool may_drop = false;
   std::size_t short_faces = 0;        // faces left out: fewer than three corners
   std::string first_short_face;       // place of the first one

@@ -12,9 +12,9 @@ namespace {
 
 constexpr double kSmallestSquare = 1e-200;  // of a cross product's squared length; digits are lost below it
 constexpr double kDegenerateSineSquared = 1e-28;
-// Rounding turns a normal by about epsilon / sine rad. It shifts a foot point by this fraction of the
-// triangle's length: 0.5 % at a sine of 4e-14. Below the sine given here, the edges are compared too. They
-// are at most half the triangle's width away.
+// Rounding turns a normal by about epsilon / sine (rad). This shifts a foot point by the same fraction of the
+// triangle's length: 0.5 % at a sine of 4e-14. If the sine is smaller than this bound, the edges are compared
+// too. They are at most half of the triangle's width away.
 constexpr double kNeedleSineSquared = 1e-12;
 
 bool sine_is_below(double sine_squared, const glm::dvec3& n, const glm::dvec3& ab, const glm::dvec3& ac) {

@@ -39,7 +39,7 @@ glm::dvec3 closest_point_on_triangle(const glm::dvec3& p, const glm::dvec3& a, c
                                      const glm::dvec3& c) noexcept;
 
 // A plane that bounds a triangle on the side of a point `view`: normal · x <= support for every point x of
-// it.
+// the triangle.
 struct TrianglePlane {
   glm::dvec3 normal{0.0};  // unit, from the centroid towards `view`; zero if they coincide
   double support = 0.0;    // maximum of normal · x over the triangle (unit: meter)

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Measures how far a proxy is from the true constrained optimum. Every proxy error of this project is
-// measured against this reference. It shares nothing with the proxy: it has its own search tree (CGAL), its
-// own closest points (long double, then exact), and its own solution of the optimality conditions.
+// measured against this reference. The reference shares nothing with the proxy: it has its own search tree
+// (CGAL), its own closest points (long double, then exact), and its own solution of the optimality
+// conditions.
 //
 // The centre q of a ball of radius r minimises |q − goal|² subject to distance(q, triangle) >= r for every
-// triangle. Each distance is differentiable outside its triangle. So q* satisfies the first-order conditions
-// (Karush, Kuhn and Tucker) if it is feasible and q* − goal = Σ λᵢ nᵢ, λᵢ >= 0. Here nᵢ are the unit vectors
-// to q* from the closest points of touching triangles. At most three vectors are needed (Carathéodory). So
-// there are three kinds of candidate: nearest points on one offset feature, and points where two or three
-// offset features meet. The offset of a face is a plane, that of an edge a cylinder, and that of a corner a
-// sphere.
+// triangle. Each distance is differentiable outside its triangle. So an optimum q* satisfies the first-order
+// conditions (Karush, Kuhn and Tucker): q* is feasible, and q* − goal = Σ λᵢ nᵢ with λᵢ >= 0. Here nᵢ is the
+// unit vector to q* from the closest point of touching triangle i. At most three vectors are needed
+// (Carathéodory). So there are three kinds of candidate: nearest points on one offset feature, and points
+// where two or three offset features meet. The offset of a face is a plane, that of an edge a cylinder, and
+// that of a corner a sphere.
 #pragma once
 
 #include <cstddef>
@@ -40,15 +41,19 @@ class OptimalityReference {
 
   // The point nearest to `proxy` that satisfies the first-order conditions. All points are in the body frame.
   //
-  // A radius below 1e-9 of the mesh's size is replaced by this skin. It stands for the limit r → 0+, in which
-  // each point is on a definite side of a sheet. A point across the surface from the proxy does not count:
-  // the straight path to it, or a path that arches over a convex edge, must not cross a triangle. The goal
-  // itself is optimal, at any distance, if the ball can go straight to it. If several points are at the same
-  // distance, the first one found is returned. `search_radius_m` bounds the search, and the amount of work is
-  // bounded too. So for a proxy that is many features away from the optimum, the error may be too large,
-  // because it belongs to a further point. It is never too small. A goal or proxy that is not finite gives
-  // found == false and an infinite error. Throws std::invalid_argument for a negative radius or search
-  // radius.
+  // Radius: a radius below the skin (1e-9 of the mesh's size) is replaced by the skin. The skin stands for
+  // the limit r → 0+, in which each point is on a definite side of a sheet.
+  //
+  // Reach: a point across the surface from the proxy does not count. The straight path to it, or a path that
+  // arches over a convex edge, must not cross a triangle. The goal itself is optimal, at any distance, if the
+  // ball can go straight to it. If several points are at the same distance, the first one found is returned.
+  //
+  // Bounds: `search_radius_m` bounds the search, and the amount of work is bounded too. So for a proxy that
+  // is many features away from the optimum, a point further away may be returned. Then error_m is too large.
+  // It is never too small.
+  //
+  // A goal or proxy that is not finite gives found == false and an infinite error. Throws
+  // std::invalid_argument for a negative radius or search radius.
   [[nodiscard]] NearestOptimum nearest_optimum(const glm::dvec3& goal, const glm::dvec3& proxy, double radius,
                                                double search_radius_m) const;
 

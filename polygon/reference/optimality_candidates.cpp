@@ -39,8 +39,9 @@ bool same(const NearFeature& a, const NearFeature& b, FineReal tolerance) {
 }  // namespace
 
 // Adds the features of a triangle that can touch a ball whose centre is within `slack` of `centre`. A
-// triangle is convex, so both the projection onto it and the vector from there to the point are nonexpansive
-// functions of the point. So a feature whose condition fails by more than `slack` at the centre cannot touch.
+// triangle is convex, so the projection of a point onto it is a nonexpansive function of the point. So is the
+// vector from the projection to the point. Therefore a feature whose condition fails by more than `slack` at
+// the centre cannot touch.
 void OptimalityReference::Search::add_features(const NearTriangle& t, const FineVec& centre,
                                                const ClosestPoint& place, FineReal slack,
                                                std::vector<NearFeature>& features) const {

@@ -11,13 +11,13 @@ namespace polygon {
 namespace {
 
 constexpr FineReal kInfinity = std::numeric_limits<FineReal>::infinity();
-// The two lengths are fractions of the mesh's size.
+// kTolerance and kFirstSearch are fractions of the mesh's size.
 constexpr double kTolerance = 1e-12;    // depth that counts as rounding
 constexpr double kFirstSearch = 1e-8;   // first search radius; enough for a converged proxy
 constexpr double kSearchGrowth = 32.0;  // factor from one search to the next
 // A few roundings of a double, relative to the largest coordinate.
 constexpr double kRounding = 2e-15;
-// Least skin, in multiples of that rounding, for meshes far from the origin.
+// Least skin, in multiples of kRounding times the largest coordinate, for meshes far from the origin.
 constexpr double kSkinRoundings = 256.0;
 
 constexpr FineReal kNegative = 1e-9L;  // relative to |q − goal|: a smaller negative multiplier counts as zero

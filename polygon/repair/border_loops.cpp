@@ -142,12 +142,13 @@ class BorderWalk {
     sides_[b].next[sides_[b].ends[0] == point ? 0 : 1] = a;
   }
 
-  // Joins the sides at a point in pairs, best pairs first. In a good pair, one side comes to the point and
-  // the other leaves it, unless a triangle is turned over. Its two sides also bound different fans of
-  // triangles, unless there is only one fan. Of equally good pairs, the one with the smallest gap angle comes
-  // first. The gap is measured from each side, away from the triangle of that side, and the smaller angle
-  // counts. At a crease a triangle can lie across the gap's plane, and then the angle from its side is
-  // unreliable.
+  // Joins the sides at a point in pairs, best pairs first. Three criteria rank the pairs, in this order:
+  //   1. One side comes to the point and the other leaves it. This fails where a triangle is turned over.
+  //   2. The two sides bound different fans of triangles. This fails where there is only one fan.
+  //   3. The gap angle is small.
+  // The gap angle is measured from each of the two sides, away from the triangle of that side. The smaller
+  // value counts: at a crease a triangle can lie across the plane of the gap, which makes the angle from its
+  // side unreliable.
   void join_across_gaps(std::uint32_t point, std::span<const std::uint32_t> here,
                         std::span<const std::uint32_t> triangles_here) {
     struct Gap {

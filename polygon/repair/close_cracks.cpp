@@ -137,8 +137,8 @@ DisjointSets merged(const std::vector<Match>& matches, std::uint32_t points) {
 }
 
 // Removes the matches at points whose merging would remove a triangle or give an edge a third triangle. One
-// pass is enough. The remaining merges are fewer, so any defect that they cause was already present, and
-// removed, with all merges.
+// pass is enough: a defect that the remaining matches cause would also occur with all matches, and the
+// matches at such defects have been removed.
 void drop_harmful(std::vector<Match>& matches, const std::vector<TriangleIndices>& triangles,
                   std::uint32_t points) {
   DisjointSets target = merged(matches, points);

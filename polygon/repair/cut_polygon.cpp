@@ -62,8 +62,8 @@ std::vector<Flat> along_axis(const std::vector<glm::dvec3>& ring, const glm::dve
   return flat;
 }
 
-// Projects the polygon along its normal. The coordinates are rounded, but corners a little off the plane
-// distort the shape less.
+// Projects the polygon along its normal. The coordinates are rounded. But corners a little off the plane
+// distort the shape less than they do in along_axis().
 std::vector<Flat> along_normal(const std::vector<glm::dvec3>& ring, const glm::dvec3& normal) {
   const glm::dvec3 n = glm::normalize(normal);
   const glm::dvec3 other = std::abs(n.x) < 0.5 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
@@ -85,8 +85,8 @@ bool fans_from_first(const std::vector<Flat>& ring) {
   return true;
 }
 
-// Net number of times that the polygon runs from one vertex of the triangulation to a neighbour: runs there
-// minus runs back.
+// Net number of passages of the polygon from one vertex of the triangulation to a neighbour: passages there
+// minus passages back.
 class Passages {
  public:
   void add(std::uint32_t from, std::uint32_t to) { ++net_[{from, to}], --net_[{to, from}]; }

@@ -29,8 +29,8 @@ struct ClosedCracks {
 };
 ClosedCracks close_cracks(RepairSoup& soup, double tolerance_m);
 
-// fill_holes() fills small holes (RepairOptions) with triangles between existing vertices. The mesh has none
-// of a fill's triangles and inner edges already.
+// fill_holes() fills small holes (RepairOptions) with triangles between existing vertices. No triangle and no
+// inner edge of a fill was already in the mesh.
 struct FilledHoles {
   FindingTally filled;
   std::size_t triangles = 0;  // added
