@@ -47,7 +47,7 @@ StrokeResult measure_stroke(const Scene& scene, const std::vector<glm::dvec3>& c
 
 // Work of the force on the device along the path (J), by the trapezoidal rule. No reference is computed. The
 // rule excludes the work of sampling: a force that is held for a tick while the hand moves on gives out
-// K·v²·T per second (device/README.md).
+// ½·K·v²·T per second (device/README.md).
 double work_of_stroke(const Scene& scene, const std::vector<glm::dvec3>& corners, double speed_m_per_s);
 
 }  // namespace hybrid::bench

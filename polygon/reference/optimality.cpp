@@ -13,7 +13,6 @@
 #include "polygon/reference/stationary_point.h"
 
 namespace polygon {
-namespace {}  // namespace
 
 struct OptimalityReference::Data {
   explicit Data(const TriangleMesh& soup) : mesh(soup) {}
