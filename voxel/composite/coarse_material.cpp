@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "voxel/lattice/link_stiffness.h"
+
 namespace voxel {
 namespace {
 
@@ -14,6 +16,17 @@ constexpr int kLevels = 12;  // levels of cubes
 // align_to() chooses an end if the voxel is further from the middle than size / (2 · kAlignFraction).
 constexpr int kAlignFraction = 4;
 constexpr int kMaxCubeEdge = 1 << (kLevels - 1);
+
+// Is there a cell on any side of a link with these parallels (link_stiffness.h)?
+bool has_cell(std::uint32_t parallels) {
+  const auto there = [parallels](int p, int q) { return (parallels >> (p + 1 + 3 * (q + 1)) & 1U) != 0; };
+  for (const int p : {-1, 1}) {
+    for (const int q : {-1, 1}) {
+      if (there(p, 0) && there(0, q) && there(p, q)) return true;
+    }
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -26,7 +39,10 @@ CoarseMaterial::CoarseMaterial(const Lattice& lattice) : lattice_(lattice), dims
     for (std::size_t d = 0; d < 3; ++d)
       levels_[index(m)].dims[d] = ((fills_box_ && !is_heterogeneous() ? dims_[d] - 1 : high(d)) >> m) + 1;
   }
-  if (!fills_box_) count_cells();
+  if (!fills_box_) {
+    count_cells();
+    has_thin_links_ = find_thin_link();
+  }
   if (is_heterogeneous()) find_stiffness();
   mark_anchors();
   list_anchor_faces();
@@ -114,15 +130,49 @@ bool CoarseMaterial::is_anchored(const Index3& p) const noexcept {
   return lattice_.anchored(lattice_.at(p[0] - offset_[0], p[1] - offset_[1], p[2] - offset_[2]));
 }
 
-void CoarseMaterial::voxel_ranks(int x0, int nx, int y, int z, std::uint8_t* out) const noexcept {
-  const int i0 = x0 - offset_[0], j = y - offset_[1], k = z - offset_[2];
+float CoarseMaterial::relative_stiffness(const Index3& p) const noexcept {
+  const VoxelId v = lattice_.at(p[0] - offset_[0], p[1] - offset_[1], p[2] - offset_[2]);
+  return stiffness_[rank_[lattice_.label(v)]];
+}
+
+float CoarseMaterial::thin_link(const Index3& p, std::size_t d, bool all_alike) const noexcept {
+  Index3 to = p;
+  ++to[d];
+  if (!is_filled(p) || !is_filled(to)) return 0.0F;
+  std::uint32_t parallels = 0;
+  for (int q = -1; q <= 1; ++q) {
+    for (int r = -1; r <= 1; ++r) {
+      Index3 from = p;
+      from[(d + 1) % 3] += r;
+      from[(d + 2) % 3] += q;
+      Index3 end = from;
+      ++end[d];
+      if (is_filled(from) && is_filled(end)) parallels |= 1U << (r + 1 + 3 * (q + 1));
+    }
+  }
+  if (has_cell(parallels)) return 0.0F;
+  const auto weight = static_cast<float>(link_weight(parallels));
+  return all_alike ? weight : weight * std::min(relative_stiffness(p), relative_stiffness(to));
+}
+
+bool CoarseMaterial::find_thin_link() const noexcept {
+  const auto surface = lattice_.surface();
+  return std::any_of(surface.begin(), surface.end(), [this](VoxelId v) {
+    Index3 p = lattice_.coordinates(v);
+    for (std::size_t d = 0; d < 3; ++d) p[d] += offset_[d];
+    return thin_link(p, 0, true) > 0.0F || thin_link(p, 1, true) > 0.0F || thin_link(p, 2, true) > 0.0F;
+  });
+}
+
+// Stiffness ranks of a line of voxels along x; 0 where there is no voxel. Coordinates without the offset.
+void CoarseMaterial::voxel_ranks(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept {
   std::fill_n(out, nx, std::uint8_t{0});
   if (j < 0 || j >= dims_[1] || k < 0 || k >= dims_[2]) return;
-  const int first = std::max(i0, 0), last = std::min(i0 + nx, dims_[0]);
+  const int first = std::max(x0, 0), last = std::min(x0 + nx, dims_[0]);
   for (int x = first; x < last;) {
     const int lane = x % kRow, count = std::min(kRow - lane, last - x);
     const std::uint8_t* from = lattice_.labels(lattice_.grid().row(x / kRow + 1, j, k)) + lane;
-    std::uint8_t* to = out + (x - i0);
+    std::uint8_t* to = out + (x - x0);
     if (is_heterogeneous()) {
       for (int i = 0; i < count; ++i) to[i] = rank_[from[i]];
     } else {
@@ -139,8 +189,8 @@ void CoarseMaterial::cell_ranks(int k, int x0, int nx, int y0, int ny, std::uint
   voxel_scratch_.resize(3 * index(width));
   std::uint8_t *before = voxel_scratch_.data(), *here = before + width, *above = here + width;
   for (int j = 0; j <= ny; ++j) {
-    voxel_ranks(x0, width, y0 + j, k, here);
-    voxel_ranks(x0, width, y0 + j, k + 1, above);
+    voxel_ranks(x0 - offset_[0], width, y0 + j - offset_[1], k - offset_[2], here);
+    voxel_ranks(x0 - offset_[0], width, y0 + j - offset_[1], k + 1 - offset_[2], above);
     for (int i = 0; i < width; ++i) here[i] = std::min(here[i], above[i]);
     for (int i = 0; i < nx; ++i) here[i] = std::min(here[i], here[i + 1]);
     if (j > 0) {

@@ -51,15 +51,15 @@ class CoarseMaterial {
     return anchored_share_[d][end];
   }
   [[nodiscard]] bool fills_box() const { return fills_box_; }
+  // Weight of the link from p to the next voxel along d if no cell is round the link: of a sheet or row of
+  // single voxels (link_stiffness.h). Otherwise 0. `all_alike`: as if all tissue had the reference stiffness.
+  [[nodiscard]] float thin_link(const Index3& p, std::size_t d, bool all_alike) const noexcept;
+  // Has the object such links?
+  [[nodiscard]] bool has_thin_links() const { return has_thin_links_; }
   // Are there tissues of different stiffness?
   [[nodiscard]] bool is_heterogeneous() const { return stiffness_.size() > 2; }
   [[nodiscard]] bool is_filled(const Index3& p) const noexcept;
   [[nodiscard]] bool is_anchored(const Index3& p) const noexcept;
-
-  // Stiffness ranks of nx voxels along x from (x, y, z) on, the softest 1; 0 where there is no voxel.
-  void voxel_ranks(int x, int nx, int y, int z, std::uint8_t* out) const noexcept;
-  // Stiffness of a rank, relative to the reference stiffness.
-  [[nodiscard]] float stiffness(std::uint8_t rank) const { return stiffness_[rank]; }
 
   // ---- cubes of 2^m cells an edge, numbered from the origin of coordinates ----
 
@@ -138,9 +138,12 @@ class CoarseMaterial {
   void find_stiffness();
   void coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse) const;
   void mark_anchors();
+  [[nodiscard]] float relative_stiffness(const Index3& p) const noexcept;
+  [[nodiscard]] bool find_thin_link() const noexcept;
   void list_anchor_faces();
   void add_anchor_face(const Index3& voxel, std::uint8_t d, std::uint8_t signs);
   [[nodiscard]] float cell_count(const CubeLevel& level, int m, const Index3& cube) const noexcept;
+  void voxel_ranks(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept;
   void cell_ranks(int k, int x0, int nx, int y0, int ny, std::uint8_t* out) noexcept;
   [[nodiscard]] AnchorSearch anchors_in_box(const Index3& p, std::size_t d, int links) const noexcept;
   [[nodiscard]] Index3 nearest_tissue_line(const Index3& p, std::size_t d, int links) const noexcept;
@@ -148,7 +151,7 @@ class CoarseMaterial {
   const Lattice& lattice_;
   Index3 dims_, offset_{};
   std::array<std::array<double, 2>, 3> anchored_share_{};
-  bool fills_box_ = false;
+  bool fills_box_ = false, has_thin_links_ = false;
   std::array<std::uint8_t, 256> rank_{};  // [label] rank of its stiffness, the softest 1; 0: no voxel
   std::vector<float> stiffness_;          // [rank] relative to the reference's
   // [rank · ranks + rank] Mean stiffness of two cells in series, times their number. Rank 0 is no cell.

@@ -68,7 +68,6 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
     for (Floats& axis : plane.stiffness)
       axis.reserve(material_.is_heterogeneous() ? plane.cells.capacity() : 0);
   }
-  for (auto& plane : voxel_planes_) plane.reserve((most + 2) * (most + 2));
   material_.reserve_planes(2 * most + 2);
   is_tissue_node_.resize(most_nodes);
   faces_of_cell_.resize(material_.has_scattered_anchors() ? most_floats : 0);

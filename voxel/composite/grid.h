@@ -272,10 +272,7 @@ class CompositeGrid {
   void weigh_shape(const Level& level, std::array<Floats, 3>& weight) noexcept;
   void weigh_box(const Level& level, std::array<Floats, 3>& weight) noexcept;
   void weigh_cells(const Level& level, std::array<Floats, 3>& weight, bool all_alike) noexcept;
-  void add_thin_tissue(const Level& level, std::array<Floats, 3>& weight, bool all_alike) noexcept;
-  template <class Stiffness>
-  [[nodiscard]] float thin_excess(std::size_t v, std::size_t d, std::size_t wide,
-                                  const Stiffness& stiffness) const noexcept;
+  void weigh_thin_links(const Level& level, std::array<Floats, 3>& weight, bool all_alike) const noexcept;
   void weigh_halves(const Level& level, std::array<Floats, 3>& weight) noexcept;
   void weigh_tissues(Level& level) noexcept;
   [[nodiscard]] static int half_cube(const Level& level) noexcept;
@@ -395,9 +392,8 @@ class CompositeGrid {
     Floats cells;
     std::array<Floats, 3> stiffness;
   };
-  std::array<HalfCells, 2> half_cells_;                    // scratch of weigh()
-  std::array<std::vector<std::uint8_t>, 3> voxel_planes_;  // stiffness ranks, scratch of add_thin_tissue()
-  Floats faces_of_cell_;  // [nearest node] faces, scratch of gather_anchors()
+  std::array<HalfCells, 2> half_cells_;  // scratch of weigh()
+  Floats faces_of_cell_;                 // [nearest node] faces, scratch of gather_anchors()
   std::array<std::array<AnchorFaces, 2>, 3> anchor_faces_;  // [d][0: of anchors above, 1: below], scratch
   std::vector<std::uint8_t> is_tissue_node_;  // scratch of find_ghosts(), with a border of one node
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
-#include "voxel/lattice/link_stiffness.h"
 
 namespace voxel {
 namespace {
@@ -35,7 +34,7 @@ void CompositeGrid::weigh_shape(const Level& level, std::array<Floats, 3>& weigh
     weigh_box(level, weight);
   } else if (level.step == 1) {
     weigh_cells(level, weight, true);
-    add_thin_tissue(level, weight, true);
+    weigh_thin_links(level, weight, true);
   } else {
     weigh_halves(level, weight);
   }
@@ -79,66 +78,24 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Adds to links between voxels that have no cell of tissue round them: of sheets and rows of single voxels
-// (LinkParts::thin). Coarse levels have no such links; there thin tissue moves with the tissue beside it.
-void CompositeGrid::add_thin_tissue(const Level& level, std::array<Floats, 3>& weight,
-                                    bool all_alike) noexcept {
+// Adds the links of sheets and rows of single voxels. Coarse levels have no such links: on them thin tissue
+// moves with the tissue beside it.
+void CompositeGrid::weigh_thin_links(const Level& level, std::array<Floats, 3>& weight,
+                                     bool all_alike) const noexcept {
+  if (!material_.has_thin_links()) return;
   const auto& nodes = level.nodes;
-  const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count, wide = nx + 2;
-  const auto read = [&](int k, std::vector<std::uint8_t>& to) {
-    to.resize(index(wide) * index(ny + 2));
-    for (int j = -1; j <= ny; ++j) {
-      std::uint8_t* const row = to.data() + index(j + 1) * index(wide);
-      material_.voxel_ranks(nodes[0].begin - 1, wide, nodes[1].begin + j, nodes[2].begin + k, row);
-      for (int i = 0; all_alike && i < wide; ++i) row[i] = std::min(row[i], std::uint8_t{1});
-    }
-  };
-  const auto stiffness = [&](std::uint8_t rank) {
-    return all_alike ? static_cast<float>(rank) : material_.stiffness(rank);
-  };
-  auto& [below, here, above] = voxel_planes_;
-  read(-1, below);
-  read(0, here);
-  for (int k = 0; k < nz; ++k) {
-    read(k + 1, above);
-    for (int j = 0; j < ny; ++j) {
-      const std::size_t row = index(j + 1) * index(wide) + 1, node = level.row(j, k);
-      for (int i = 0; i < nx; ++i) {
-        const std::size_t v = row + index(i);
-        if (here[v] == 0) continue;
-        const std::array<std::uint8_t, 3> next{here[v + 1], here[v + index(wide)], above[v]};
+  for (int k = 0; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j) {
+      for (int i = 0; i < nodes[0].count; ++i) {
+        const Index3 node{i, j, k}, p{level.at(0, i), level.at(1, j), level.at(2, k)};
+        const std::size_t n = level.node(i, j, k);
         for (std::size_t d = 0; d < 3; ++d) {
-          const float own = stiffness(std::min(here[v], next[d]));
-          float& w = weight[d][node + index(i)];
-          const bool is_link = (d == 0 ? i + 1 < nx : d == 1 ? j + 1 < ny : k + 1 < nz);
-          if (is_link && w == 0.0F && own > 0.0F) w += thin_excess(v, d, index(wide), stiffness);
+          if (weight[d][n] == 0.0F && node[d] + 1 < nodes[d].count)
+            weight[d][n] = material_.thin_link(p, d, all_alike);
         }
       }
     }
-    std::swap(below, here);
-    std::swap(here, above);
   }
-}
-
-// Excess stiffness of thin tissue on the link along d from voxel v in the middle plane of voxel_planes_,
-// relative to the reference stiffness.
-template <class Stiffness>
-float CompositeGrid::thin_excess(std::size_t v, std::size_t d, std::size_t wide,
-                                 const Stiffness& stiffness) const noexcept {
-  const auto rank_at = [&](const Index3& by) {
-    return voxel_planes_[index(by[2] + 1)][v + index(by[1] + 1) * wide - wide + index(by[0] + 1) - 1];
-  };
-  std::array<LinkModuli, 9> links;
-  for (int n = 0; n < 9; ++n) {
-    Index3 from{};
-    from[(d + 1) % 3] = n % 3 - 1;
-    from[(d + 2) % 3] = n / 3 - 1;
-    Index3 to = from;
-    ++to[d];
-    const auto modulus = static_cast<double>(stiffness(std::min(rank_at(from), rank_at(to))));
-    links[index(n)] = {modulus, modulus};
-  }
-  return static_cast<float>(link_parts(links).thin.along_Pa);
 }
 
 // Level m of the half cells: cubes of which two lie along a link.
@@ -188,7 +145,7 @@ void CompositeGrid::weigh_halves(const Level& level, std::array<Floats, 3>& weig
 void CompositeGrid::weigh_tissues(Level& level) noexcept {
   if (level.step == 1) {
     weigh_cells(level, level.weight, false);
-    return add_thin_tissue(level, level.weight, false);
+    return weigh_thin_links(level, level.weight, false);
   }
   const auto& nodes = level.nodes;
   const int nx = nodes[0].count, ny = nodes[1].count, nz = nodes[2].count;

@@ -263,7 +263,6 @@ std::size_t CompositeGrid::memory_bytes() const {
     for (const Floats* part : {&plane.cells, &plane.stiffness[0], &plane.stiffness[1], &plane.stiffness[2]})
       bytes += part->capacity() * sizeof(float);
   }
-  for (const auto& plane : voxel_planes_) bytes += plane.capacity();
   return bytes;
 }
 
