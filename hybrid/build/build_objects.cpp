@@ -92,12 +92,6 @@ voxel::LabelVolume read_volume(const std::string& object, const std::filesystem:
   return volume;
 }
 
-// Does the surface follow intensities? It does for a range of intensities, but not for labels. A grown
-// surface has no intensities.
-bool follows_intensities(const VolumeSurfaceSource& s) {
-  return s.rules.size() == 1 && s.rules[0].lower < s.rules[0].upper && s.grow_m == 0.0;
-}
-
 // intensity_surface() and label_surface() return the surface in the frame of `volume`, which receives the
 // labels.
 polygon::TriangleMesh intensity_surface(const std::string& object, const VolumeSurfaceSource& s,
@@ -111,8 +105,8 @@ polygon::TriangleMesh intensity_surface(const std::string& object, const VolumeS
   if (read.intensities.empty()) {
     notes.push_back(
         {object, polygon::Severity::warning,
-         "its surface follows the voxels, because their intensities do not fit into memory; choose "
-         "a larger spacing for one between them"});
+         "its surface follows the voxels, because their intensities do not fit into memory; with a larger "
+         "spacing it would lie between them"});
     return surface_from_labels(volume, s.smooth);
   }
   // Whole numbers are rounded intensities: 300 stands for 299.5 to 300.5.
@@ -136,7 +130,8 @@ RigidObject volume_surface_object(const RigidDescription& d, const VolumeSurface
       s.spacing_m ? std::optional<glm::dvec3>(glm::dvec3(*s.spacing_m)) : std::nullopt;
   const voxel::VolumeFileOptions options = volume_options(s.rules, s.unit_m, spacing);
   voxel::LabelVolume volume;
-  const auto surface = follows_intensities(s) ? intensity_surface : label_surface;
+  const bool between_voxels = s.between_voxels && s.grow_m == 0.0;
+  const auto surface = between_voxels ? intensity_surface : label_surface;
   polygon::TriangleMesh mesh = surface(d.name, s, options, volume, notes);
   const Pose frame{d.pose.position_m + d.pose.rotation * volume.origin_m, d.pose.rotation * volume.rotation};
   if (mesh.empty())

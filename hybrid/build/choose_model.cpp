@@ -98,10 +98,6 @@ RigidDescription as_rigid(const SoftDescription& soft) {
                                 .unit_m = volume.unit_m};
     if (volume.spacing_m) surface.spacing_m = volume.spacing_m->x;
     surface.largest = volume.largest;
-    // Repeats the rule, which changes no label. A surface with two rules follows the voxels and not the
-    // intensities (build_objects.cpp), as the surface of the soft object does. So nothing but the model
-    // differs between the two models of an object.
-    if (surface.rules.size() == 1) surface.rules.push_back(surface.rules.front());
     rigid.source = surface;
   }
   return rigid;

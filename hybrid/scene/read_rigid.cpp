@@ -85,6 +85,7 @@ VolumeSurfaceSource read_volume_surface(const TableReader& table) {
   VolumeSurfaceSource out;
   out.file = table.file("volume", true);
   out.rules = read_label_rules(table, false);
+  out.between_voxels = table.has("range") && out.rules.front().lower < out.rules.front().upper;
   if (table.has("spacing")) out.spacing_m = table.number("spacing", table.source().size());
   out.grow_m = table.number("grow", table.source().distance(), out.grow_m);
   out.smooth = static_cast<int>(table.integer("smooth", 0, 1000, out.smooth));

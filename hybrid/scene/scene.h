@@ -81,6 +81,9 @@ struct CutPlane {  // cuts away the half-space that the normal points into; scen
 struct VolumeSurfaceSource {
   std::filesystem::path file;
   std::vector<voxel::LabelRule> rules;  // which voxels are inside
+  // Does the surface lie between voxels, where the intensity passes an end of the only rule? Otherwise it
+  // follows the voxels. A grown surface always follows them.
+  bool between_voxels = false;
   std::optional<double> spacing_m;
   double grow_m = 0.0;  // the surface is moved outward by this much
   int smooth = 10;      // smoothing passes
