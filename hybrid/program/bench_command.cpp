@@ -183,14 +183,6 @@ void threads_suite(const BenchCommand& command, std::FILE* words, nlohmann::orde
   for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
 }
 
-// Does the suite have anything to do? In "all" a suite is left out if every chosen name belongs to other
-// suites.
-bool has_work(const BenchCommand& command, const std::vector<std::string>& cases,
-              const std::vector<std::string>& engines) {
-  return (command.only.empty() || !chosen_in_suite(command.only, cases).empty()) &&
-         (command.engines.empty() || !chosen_in_suite(command.engines, engines).empty());
-}
-
 template <class Engines>
 std::vector<std::string> names_of(const Engines& engines) {
   std::vector<std::string> names;
@@ -203,6 +195,30 @@ std::string listed(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
+}
+
+// The names that may be chosen in a suite: its parts and its engines.
+struct SuiteNames {
+  std::string suite;
+  std::vector<std::string> parts, engines;
+};
+std::vector<SuiteNames> suite_names() {
+  return {{"rigid", bench::rigid_paths(), names_of(bench::kEngines)},
+          {"soft", bench::soft_cases(), names_of(bench::kSoftEngines)},
+          {"occupancy", bench::occupancy_cases(), names_of(bench::kOccupancyEngines)}};
+}
+
+// The suites that run. In "all" a suite is left out if every chosen name belongs to other suites.
+std::vector<SuiteNames> running_suites(const BenchCommand& command) {
+  const auto has_any = [](const std::vector<std::string>& chosen, const std::vector<std::string>& names) {
+    return chosen.empty() || !chosen_in_suite(chosen, names).empty();
+  };
+  std::vector<SuiteNames> running = suite_names();
+  std::erase_if(running, [&](const SuiteNames& names) {
+    return (command.suite != "all" && command.suite != names.suite) || !has_any(command.only, names.parts) ||
+           !has_any(command.engines, names.engines);
+  });
+  return running;
 }
 
 }  // namespace
@@ -229,19 +245,19 @@ const std::vector<BenchOption>& bench_options() {
   return kOptions;
 }
 std::vector<std::string> bench_parts() {
-  std::vector<std::string> parts = bench::rigid_paths();
-  parts.insert(parts.end(), bench::soft_cases().begin(), bench::soft_cases().end());
-  parts.insert(parts.end(), bench::occupancy_cases().begin(), bench::occupancy_cases().end());
+  std::vector<std::string> parts;
+  for (const SuiteNames& names : suite_names())
+    parts.insert(parts.end(), names.parts.begin(), names.parts.end());
   return parts;
 }
 std::vector<std::string> bench_engines() {
-  std::vector<std::string> names = names_of(bench::kEngines);
-  for (const auto& more : {names_of(bench::kSoftEngines), names_of(bench::kOccupancyEngines)}) {
-    for (const std::string& name : more) {
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  std::vector<std::string> engines;
+  for (const SuiteNames& names : suite_names()) {
+    for (const std::string& name : names.engines) {
+      if (std::find(engines.begin(), engines.end(), name) == engines.end()) engines.push_back(name);
     }
   }
-  return names;
+  return engines;
 }
 std::string bench_mesh_error(const std::string& name) {
   try {
@@ -254,25 +270,11 @@ std::string bench_mesh_error(const std::string& name) {
 
 namespace {
 
-// The names that may be chosen in a suite: its parts and its engines.
-struct SuiteNames {
-  const char* suite;
-  std::vector<std::string> parts, engines;
-};
-std::vector<SuiteNames> suite_names() {
-  return {{"rigid", bench::rigid_paths(), names_of(bench::kEngines)},
-          {"soft", bench::soft_cases(), names_of(bench::kSoftEngines)},
-          {"occupancy", bench::occupancy_cases(), names_of(bench::kOccupancyEngines)}};
-}
-
 // Refuses chosen names that have no effect in any of the suites that run. The message lists the names that
 // these suites have.
 void refuse_names_without_effect(const BenchCommand& command) {
   std::vector<std::string> parts, engines;
-  for (const SuiteNames& names : suite_names()) {
-    if ((command.suite != "all" && command.suite != names.suite) ||
-        !has_work(command, names.parts, names.engines))
-      continue;
+  for (const SuiteNames& names : running_suites(command)) {
     parts.insert(parts.end(), names.parts.begin(), names.parts.end());
     engines.insert(engines.end(), names.engines.begin(), names.engines.end());
   }
@@ -280,7 +282,7 @@ void refuse_names_without_effect(const BenchCommand& command) {
     for (const std::string& name : chosen) {
       if (std::find(known.begin(), known.end(), name) != known.end()) continue;
       throw std::invalid_argument(
-          fmt::format("bench {}: {} {} has no effect there; leave it out, or choose of {}", command.suite,
+          fmt::format("bench {}: {} {} has no effect there; leave it out, or choose from {}", command.suite,
                       option, name, listed(known)));
     }
   };
@@ -294,24 +296,24 @@ void refuse_names_without_effect(const BenchCommand& command) {
 void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered_json& report) {
   std::FILE* words = outputs.words();
   nlohmann::ordered_json& suites = report["suites"] = nlohmann::ordered_json::object();
-  const auto runs = [&command](const char* suite) {
-    return command.suite == "all" || command.suite == suite;
+  const std::vector<SuiteNames> running = running_suites(command);
+  const auto runs = [&running](const char* suite) {
+    return std::ranges::find(running, suite, &SuiteNames::suite) != running.end();
   };
   const auto rows_of = [&suites](const char* suite) -> nlohmann::ordered_json& {
     return suites[suite] = nlohmann::ordered_json::array();
   };
-  if (runs("rigid") && has_work(command, bench::rigid_paths(), names_of(bench::kEngines)))
-    rigid_suite(command, words, rows_of("rigid"));
-  if (runs("soft") && has_work(command, bench::soft_cases(), names_of(bench::kSoftEngines))) {
+  if (runs("rigid")) rigid_suite(command, words, rows_of("rigid"));
+  if (runs("soft")) {
     nlohmann::ordered_json growth;
     soft_suite(command, words, outputs, rows_of("soft"), growth);
     report["growth"] = growth;
   }
-  if (runs("occupancy") && has_work(command, bench::occupancy_cases(), names_of(bench::kOccupancyEngines)))
-    occupancy_suite(command, words, outputs, rows_of("occupancy"));
+  if (runs("occupancy")) occupancy_suite(command, words, outputs, rows_of("occupancy"));
   if (command.suite == "threads" && command.scenes.empty())
     throw std::invalid_argument("bench threads: no scene; say which, as in --scenes scenes/cube.toml");
-  if (!command.scenes.empty() && runs("threads")) threads_suite(command, words, rows_of("threads"));
+  if (!command.scenes.empty() && (command.suite == "all" || command.suite == "threads"))
+    threads_suite(command, words, rows_of("threads"));
   if (!suites.empty()) return;
   throw std::invalid_argument(fmt::format(
       "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "

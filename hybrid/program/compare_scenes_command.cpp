@@ -123,10 +123,7 @@ void print_scenes(std::FILE* words, const ScenesComparison& comparison, bool own
       {{"tick us", "p50/p99/p99.9/max"},
        20,
        Side::right,
-       [](const ComparedScene& s) {
-         const Percentiles& t = s.tick_us;
-         return fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max);
-       }},
+       [](const ComparedScene& s) { return in_words(s.tick_us); }},
       {{"MB"},
        7,
        Side::right,

@@ -248,6 +248,10 @@ nlohmann::ordered_json report_head(const std::string& command) {
   return j;
 }
 
+std::string in_words(const Percentiles& p) {
+  return fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", p.p50, p.p99, p.p999, p.max);
+}
+
 nlohmann::ordered_json to_json(const Percentiles& p) {
   return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
 }

@@ -13,6 +13,8 @@ namespace hybrid {
 // The first entries of every report: command, version, machine.
 nlohmann::ordered_json report_head(const std::string& command);
 nlohmann::ordered_json to_json(const Percentiles& p);
+// "p50/p99/p99.9/max", without decimals.
+std::string in_words(const Percentiles& p);
 nlohmann::ordered_json run_report(const Scene& scene, const BuiltScene& built, SessionResult& result);
 
 // The same report as text for a person to read.

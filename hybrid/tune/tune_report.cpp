@@ -118,10 +118,7 @@ Table<TunedSetting> setting_table(const std::function<char(const TunedSetting&)>
       {{"tick us", "p50/p99/p99.9/max"},
        17,
        Side::right,
-       [](const TunedSetting& s) {
-         const Percentiles& t = s.tick_us;
-         return fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", t.p50, t.p99, t.p999, t.max);
-       }},
+       [](const TunedSetting& s) { return in_words(s.tick_us); }},
       {{"p99.9 of", "single passes"},
        13,
        Side::right,
