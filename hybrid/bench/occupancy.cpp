@@ -184,7 +184,7 @@ std::size_t OccupancyBench::ask_brute(const QueryBox& box, Found& out) const {
 
 std::size_t OccupancyBench::ask(OccupancyEngine engine, const QueryBox& box, Found& out) const {
   if (engine == OccupancyEngine::brute) return ask_brute(box, out);
-  // For triangles the map only tells whether there are any, so the tree stops at the first.
+  // The map only says whether a box has triangles. So the tree stops at its first triangle.
   if (!voxels()) {
     if (engine == OccupancyEngine::map) return map_->rigid_in(box.map_low, box.map_high, trail_) != 0 ? 1 : 0;
     return tree_->in(box.low, box.high, std::span(out).first(1));

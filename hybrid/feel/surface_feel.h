@@ -60,7 +60,7 @@ struct FrictionStep {
 //
 // On a plane the step ends between the proxy and the frictionless minimum. So ½ (target − q)ᵀ A (target − q)
 // never grows: the work of the hand is stored or dissipated. On a curved surface the step can be longer.
-// friction_dissipates() tells whether the step lost energy. If it did not, the proxy must stay.
+// friction_dissipates() returns whether the step lost energy. If it did not, the proxy must stay.
 //
 // If the proxy slid in one pass of a tick, pass `sliding` = true in the later passes and in the next tick.
 FrictionStep friction_target(const glm::dvec3& proxy, const glm::dvec3& target, const glm::dmat3& metric,

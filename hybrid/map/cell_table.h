@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A hash table from the coordinates of a brick (or block) of cells to a layer's entry. A look-up in a large
-// table waits for memory once: entries are in the table itself. A byte per place tells which place to read,
-// and these bytes fit into a cache.
+// A hash table from the coordinates of a brick (or block) of cells to a layer's entry. The table itself holds
+// the entries. A byte per place selects the place to read, and these bytes fit into a cache. So a look-up in
+// a large table waits for memory once.
 //
 // Places are in chunks of seven. A chunk's word has a tag for each place (0: free), and the number of entries
 // that found the chunk full and passed on to a later chunk. A search for a missing entry therefore ends

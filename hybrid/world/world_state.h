@@ -105,7 +105,7 @@ struct CarriedState {
   device::Clock clock;                // simulated time, on which the bodies' paths depend
   std::uint64_t nonfinite = 0;        // inputs or forces that were not finite
   std::uint32_t faults = 0;           // FaultBit, accumulated over the session
-  std::uint64_t truncated_ticks = 0;  // ticks in which the proxy stopped early, at a bound on its steps
+  std::uint64_t truncated_ticks = 0;  // ticks in which a bound on steps or work stopped the proxy early
 
   // ---- of the proxy ----
   double learnt_stiffness_N_per_m = 0.0;  // tissue stiffness in excess of the pressed voxels' model

@@ -248,7 +248,7 @@ class Multigrid {
   }
   void move_batch(Displacement& state) noexcept { apply_limited_correction(state); }
   // True if the row was added. Then `left` is the part of its motion that it has not made (m), and `gone`
-  // tells whether it has made all of its motion.
+  // is true if the row has made all of its motion.
   [[nodiscard]] bool batched(RowId row, const Displacement& state, RowVector& left,
                              bool& gone) const noexcept {
     const LimitedCorrection::Row* r = limited_correction_.find(row);

@@ -110,7 +110,7 @@ LimitReactions::Row* LimitReactions::look_at(RowId row) noexcept {
 }
 
 // Returns the lanes of a row whose voxels are pushed against their loads, or blocked both ways, by links at
-// their limits. `end` tells which end of these links lies in the row.
+// their limits. `end`: the end of these links that lies in the row.
 std::uint32_t LimitReactions::pushed(const Row& row, std::uint32_t at_low, std::uint32_t at_high,
                                      End end) noexcept {
   const std::uint32_t up = end == End::upper ? at_low : at_high, down = end == End::upper ? at_high : at_low;

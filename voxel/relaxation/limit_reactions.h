@@ -33,7 +33,7 @@ class LimitReactions {
   // ---- none of these allocates or throws ----
   // Finds, on one axis, all dependents of `sources` (sorted by id, none anchored), directly or through
   // others. A voxel depends on a neighbour in two cases. Either their link is at a limit and pushes the voxel
-  // against its own load, or the link lets the voxel move neither way. Drops what was found before.
+  // against its own load, or the link lets the voxel move neither way. Earlier results are dropped.
   void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> sources,
               int axis) noexcept;
   // Finds, on one axis, all dependents of a rigid block. The load of a voxel in another block is the load of

@@ -142,7 +142,12 @@ Sweep shade(const World& world, WorldState& state, const Goal& goal, Sweep sweep
         sweep_proxy(world, state, sweep.point, goal.target,
                     shading_metric(goal.metric, {normals.data(), contacts.count}), goal.travel);
     const double moved = glm::length(next.point - sweep.point);
-    sweep = {next.point, next.arrived, next.force_N, sweep.steps + next.steps, sweep.surveys + next.surveys};
+    sweep = {.point = next.point,
+             .arrived = next.arrived,
+             .force_N = next.force_N,
+             .steps = sweep.steps + next.steps,
+             .surveys = sweep.surveys + next.surveys,
+             .work = sweep.work + next.work};
     if (moved <= kShadingConverged * glm::length(goal.target - sweep.point)) break;
   }
   if (!any) return sweep;
