@@ -88,7 +88,12 @@ void CoarseMaterial::add_anchor_face(const Index3& voxel, std::uint8_t d, std::u
         !lattice_.filled(at(along, 1, 1)))
       return;
   }
-  PackedFace face{{}, d, signs};
+  PackedFace face{{}, static_cast<std::uint8_t>(d << 3U | signs), std::numeric_limits<std::uint8_t>::max()};
+  for (const int along : {0, 1}) {
+    for (const int p : {0, 1}) {
+      for (const int q : {0, 1}) face.rank = std::min(face.rank, rank_[lattice_.label(at(along, p, q))]);
+    }
+  }
   for (std::size_t e = 0; e < 3; ++e) face.voxel[e] = static_cast<std::uint16_t>(voxel[e]);
   anchor_faces_.push_back(face);
 }

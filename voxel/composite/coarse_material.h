@@ -96,6 +96,7 @@ class CoarseMaterial {
     std::size_t d = 0;
     int side = 0;               // −1 or 1: side of the neighbour along d
     std::array<int, 2> cell{};  // −1 or 1: side of the cell along d + 1 and d + 2
+    float stiffness = 1.0F;     // of the cell, relative to the reference
   };
   // If anchors are scattered: calls visit(face) for the faces of the anchored voxels in the box, cube by
   // cube.
@@ -160,8 +161,8 @@ class CoarseMaterial {
   std::vector<std::uint8_t> voxel_scratch_, cell_scratch_;
   struct PackedFace {
     std::array<std::uint16_t, 3> voxel{};  // without the offset
-    std::uint8_t d = 0;
-    std::uint8_t signs = 0;  // bit 0: side; bits 1 and 2: cell. 1 if set, else −1
+    std::uint8_t sides = 0;  // bit 0: side; bits 1 and 2: cell; 1 if set, else −1. Bits 3 and 4: d
+    std::uint8_t rank = 0;   // of the cell's stiffness
   };
   std::vector<PackedFace> anchor_faces_;    // sorted by cubes of level kFirstAnchorLevel
   std::vector<std::uint32_t> faces_until_;  // [cube] end of its faces in anchor_faces_
@@ -182,8 +183,9 @@ void CoarseMaterial::for_anchor_faces(const Index3& low, const Index3& high, con
         const std::size_t at = cubes.at(cube);
         for (std::uint32_t n = at > 0 ? faces_until_[at - 1] : 0; n < faces_until_[at]; ++n) {
           const PackedFace& packed = anchor_faces_[n];
-          const auto sign = [&packed](int bit) { return (packed.signs >> bit & 1) != 0 ? 1 : -1; };
-          AnchorFace face{{}, packed.d, sign(0), {sign(1), sign(2)}};
+          const auto sign = [&packed](int bit) { return (packed.sides >> bit & 1) != 0 ? 1 : -1; };
+          AnchorFace face{
+              {}, std::size_t{packed.sides} >> 3U, sign(0), {sign(1), sign(2)}, stiffness_[packed.rank]};
           bool inside = true;
           for (std::size_t d = 0; d < 3; ++d) {
             face.voxel[d] = packed.voxel[d] + offset_[d];

@@ -18,7 +18,8 @@ constexpr float kRegular = 0.999F;
 // Stiffness along d of the fine level against a prolonged unit correction of one coarse node. A link counts
 // by the squared difference of the interpolation weights at its ends, an anchor by the interpolation weight
 // of its node.
-float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std::size_t d) const noexcept {
+CompositeGrid::ProlongedWeight CompositeGrid::prolonged_weight(const Level& fine, const Index3& node,
+                                                               std::size_t d) const noexcept {
   std::array<std::array<float, 5>, 3> along{};  // interpolation weights at −2 … 2 fine nodes
   std::array<std::size_t, 3> by{};
   for (std::size_t e = 0; e < 3; ++e) {
@@ -32,7 +33,7 @@ float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std
                                        fine.nodes[2].fine[index(node[2])]);
   const auto& weight = shape_weights(fine)[d];
   const auto is_free = [&](std::size_t n) { return fine.inverse_diagonal[0][n] != 0.0F ? 1.0F : 0.0F; };
-  float sum = 0.0F;
+  ProlongedWeight sum;
   for (std::size_t q = 1; q <= 3; ++q) {
     for (std::size_t p = 1; p <= 3; ++p) {
       const float across = along[e][p] * along[f][q];
@@ -41,7 +42,8 @@ float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std
       float before = 0.0F;
       for (std::size_t t = 0; t < 4; ++t, n += by[d]) {
         const float after = across * along[d][t + 1] * is_free(n + by[d]);
-        sum += weight[n] * (after - before) * (after - before) + fine.anchor_weight[d][n + by[d]] * after;
+        sum.links += weight[n] * (after - before) * (after - before);
+        sum.anchors += fine.anchor_weight[d][n + by[d]] * after;
         before = after;
       }
     }
@@ -66,10 +68,14 @@ void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) co
         bool any = false;
         for (std::size_t d = 0; d < 3; ++d) {
           const auto& weight = shape_weights(coarse)[d];
-          const float own = weight[n] + weight[n - coarse.stride_along(d)] + coarse.anchor_weight[d][n];
-          if (own >= kRegular * static_cast<float>(2 * coarse.step)) continue;
-          spring.weight[d] =
-              stiffness_at(coarse, n) * std::max(prolonged_weight(fine, {i, j, k}, d) - own, 0.0F);
+          const float links = weight[n] + weight[n - coarse.stride_along(d)],
+                      anchors = coarse.anchor_weight[d][n];
+          const bool whole = links >= kRegular * static_cast<float>(2 * coarse.step);
+          if (whole && !material_.has_scattered_anchors()) continue;
+          const ProlongedWeight fine_weight = prolonged_weight(fine, {i, j, k}, d);
+          // Weights of links are by shape here, those of anchors include the stiffness of their tissue.
+          spring.weight[d] = stiffness_at(coarse, n) * std::max(fine_weight.links - links, 0.0F) +
+                             std::max(fine_weight.anchors - anchors, 0.0F);
           any = any || spring.weight[d] > 0.0F;
         }
         if (any && coarse.correction_springs.size() < coarse.correction_springs.capacity())

@@ -73,7 +73,8 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
   faces_of_cell_.resize(material_.has_scattered_anchors() ? most_floats : 0);
   for (auto& sides : anchor_faces_) {
     for (AnchorFaces& faces : sides) {
-      for (Floats* const array : {&faces.count, &faces.in_link, &faces.distance, &faces.constriction})
+      for (Floats* const array :
+           {&faces.count, &faces.in_link, &faces.distance, &faces.constriction, &faces.stiffness})
         array->resize(material_.has_scattered_anchors() ? most_floats : 0);
     }
   }

@@ -35,9 +35,9 @@ struct AxisNodes {
   std::vector<float> restrict_low, restrict_own, restrict_high;
 };
 // By node: number of anchor faces that hold the node from one side; number of these faces that lie in a link;
-// sums over the faces of their distance (voxels) and of constriction_of_face().
+// sums over the faces of their distance (voxels), of constriction_of_face() and of their cell's stiffness.
 struct AnchorFaces {
-  Floats count, in_link, distance, constriction;
+  Floats count, in_link, distance, constriction, stiffness;
 };
 // Springs that hold a node at its present displacement, beside the springs of its links. Without them
 // corrections would move it too far. weight [d]: stiffness relative to a link between two voxels.

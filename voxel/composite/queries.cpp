@@ -229,7 +229,7 @@ std::size_t CompositeGrid::memory_bytes() const {
                       links_to_anchor_.capacity() * sizeof(std::uint32_t) + is_tissue_node_.capacity() +
                       faces_of_cell_.capacity() * sizeof(float);
   for (const auto& sides : anchor_faces_) {
-    for (const AnchorFaces& faces : sides) bytes += 4 * faces.count.capacity() * sizeof(float);
+    for (const AnchorFaces& faces : sides) bytes += 5 * faces.count.capacity() * sizeof(float);
   }
   const auto add = [&bytes](const Level& level) {
     for (const auto* arrays : {&level.u, &level.at_bound, &level.weight, &level.anchor_weight,

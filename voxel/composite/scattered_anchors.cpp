@@ -55,7 +55,8 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
     low[d] = level.at(d, 0) - step / 2;
     high[d] = level.at(d, level.nodes[d].count - 1) + step / 2;
     for (AnchorFaces& faces : anchor_faces_[d]) {
-      for (Floats* const array : {&faces.count, &faces.in_link, &faces.distance, &faces.constriction})
+      for (Floats* const array :
+           {&faces.count, &faces.in_link, &faces.distance, &faces.constriction, &faces.stiffness})
         std::fill(array->begin(), array->end(), 0.0F);
     }
   }
@@ -76,6 +77,7 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
     faces.distance[held] += kArea * static_cast<float>(distance);
     faces.in_link[held] += distance > 0 ? kArea : 0.0F;
     faces.constriction[held] += kArea * constriction_of_face(level, nearest);
+    faces.stiffness[held] += kArea * face.stiffness;
   });
   if (!any) return;
   level.has_anchors = true;
@@ -85,7 +87,7 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
     const auto& [from_above, from_below] = anchor_faces_[d];
     for (std::size_t n = first; n < end; ++n) {
       const float weight = weight_of_faces(from_above, n, square) + weight_of_faces(from_below, n, square);
-      if (weight > 0.0F) level.anchor_weight[d][n] = stiffness_at(level, n) * weight;
+      if (weight > 0.0F) level.anchor_weight[d][n] = weight;
     }
   }
   // A node behind a face has only anchored tissue if no other face holds the node. Such a node gets the
@@ -119,7 +121,8 @@ float CompositeGrid::constriction_of_face(const Level& level, std::size_t cell) 
 // Weight by which N of the s² faces of a cell hold a node. In series with the faces lie the tissue between
 // them and the node, and the constriction of the load that spreads from N faces to s². The constriction has
 // the factor (1 − ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² the weight is that of
-// the chain of links.
+// the chain of links. The faces' cells are as stiff as their mean: tissue beside them that does not touch an
+// anchor does not count.
 float CompositeGrid::weight_of_faces(const AnchorFaces& faces, std::size_t n, float square) noexcept {
   const float count = faces.count[n];
   if (count == 0.0F) return 0.0F;
@@ -127,7 +130,8 @@ float CompositeGrid::weight_of_faces(const AnchorFaces& faces, std::size_t n, fl
   const float resistance = faces.distance[n] / (count * square) +
                            std::max(1.0F / count - 1.0F / square, 0.0F) +
                            std::pow(1.0F - std::sqrt(share), 1.5F) * faces.constriction[n] / (count * count);
-  return 1.0F / std::max(resistance, kLeastResistance / square);
+  const float stiffness = faces.stiffness[n] / count;
+  return stiffness / std::max(resistance, kLeastResistance / square);
 }
 
 // Stiffness of the tissue round a node, relative to the reference stiffness.
