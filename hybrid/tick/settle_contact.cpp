@@ -142,9 +142,7 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   state.proxy_m = sweep.point;
   if (near_soft) {
     press_tissue(world, state, state.proxy_m, delta, kSettings.sweeps);
-    // On nested patches the model is that of the equilibrium: there is nothing to learn.
-    if (!contact_on_patches(state))
-      learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
+    learn_stiffness(world, state, delta, pull, pull_on_proxy(world, state, device), model, metric);
     if (first_pass) state.jammed.clear();
     tool_bounds(world, state, state.proxy_m, true, kSettings.soft_step, state.jammed);
   }

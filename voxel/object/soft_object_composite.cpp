@@ -23,10 +23,6 @@ constexpr std::uint32_t kAllAxes = 4;  // number of cycles at the start of a con
 // In spacings. A voxel no further than kPressed from the tool is pressed. Tissue on its way back is still
 // felt up to a distance of kOnItsWay.
 constexpr double kPressed = 0.02, kOnItsWay = 0.5;
-// Tangent stiffness over secant stiffness for the proxy's next step, along the force and across it. Where
-// chain limits are active, the force grows with the square of the depth (ratio 2), else with a power of 1 to
-// 1.5.
-constexpr double kTangent = 2.0, kAcross = 0.5;
 // Displacements far away scale with this power of the depth.
 constexpr double kWithDepth = 1.7;
 // Least depth at which displacements are scaled (spacings); largest scaling in a cycle (share of the depth).
@@ -362,9 +358,9 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
     const glm::dvec3 springs = static_cast<double>(result.pressed) / grid_->compliance(centre_);
     for (int d = 0; d < 3; ++d) result.stiffness_N_per_m[d][d] = springs[d];
   } else {
-    const double secant = size / depth;
-    result.stiffness_N_per_m =
-        glm::dmat3(kAcross * secant) + (kTangent - kAcross) * secant * glm::outerProduct(n, n);
+    // The secant stiffness, along the force. Across it the tool slides without friction. Where steps by this
+    // model go too far, the tick learns a larger stiffness (settle_contact.cpp).
+    result.stiffness_N_per_m = size / depth * glm::outerProduct(n, n);
   }
   // Until the next cycle the force is that of the last cycle, less stiffness times the tool's motion since
   // then.
