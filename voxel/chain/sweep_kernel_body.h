@@ -241,7 +241,9 @@ HYBRID_INLINE bool revisits_x(const SweepTask& p, const RowNow& row) {
                          *row.x, p.margin);
 }
 
-// Relaxes a row. `y`: values of the row before it in y; on return those of this row, if it moved.
+// Moves the voxels of one row as far as the limits of their links to the rows before it require. `y` and `z`:
+// displacements of the row before it in y and in z, in the direction of the sweep (m). If any voxel of this
+// row moved, `y` holds the displacements of this row on return, because the next row of the sweep needs them.
 template <bool kRaise, int kRegisters, class Limits>
 HYBRID_INLINE Moved sweep_row(const SweepTask& p, const RowNow& row, Limits& by_y, Limits& by_z,
                               const RowValues& z, RowValues& y) {

@@ -58,8 +58,8 @@ class BoundarySprings {
   [[nodiscard]] const float* hold(int level, RowId row, std::size_t axis) const {
     return at(level).hold[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
-  // [lane] A cell takes the part 1 / (1 + nearer) of a prolonged correction, because it is nearer to the
-  // fixed place than the middle of the coarser cell is.
+  // [lane] A cell takes the share 1 / (1 + nearer) of a correction that is prolonged to it. The share is less
+  // than 1, because the cell is nearer to the fixed voxel than the middle of the coarser cell is.
   [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
     return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
@@ -77,9 +77,10 @@ class BoundarySprings {
 
  private:
   using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links along d (N/m)
-  // Springs of anchors are found when their row is first asked for, because all of them would take much
-  // memory. On coarse levels finding them takes long: there they are found on construction and stored as
-  // records, without zeros.
+  // The springs that anchors add to one cell, without zeros. On levels finer than LevelStiffness::kKept,
+  // springs of anchors are found when their row is first read, because the springs of all rows would take
+  // much memory. From level kKept on it would take long to find those of a row. So there they are found on
+  // construction, and each cell with such springs has a record.
   struct Record {
     VoxelId cell;
     std::uint32_t first;  // index of its first value in Level::values
@@ -95,7 +96,8 @@ class BoundarySprings {
     LazyArray<std::uint8_t> row_tilted;  // [row] number of cells with an off-diagonal stiffness
     LazyArray<std::uint8_t> queued;      // [cell] 1: it is queued
     LazyArray<std::uint32_t> found;      // [row] lanes of a waiting row whose springs are stored
-    // Springs of the cells near anchors, sorted by cell; on levels from LevelStiffness::kKept on.
+    // The records of this level, in the order of their cells; empty on levels finer than
+    // LevelStiffness::kKept. `values` has the stiffnesses of all records, one record after another (N/m).
     std::vector<Record> records;
     std::vector<float> values;
   };
