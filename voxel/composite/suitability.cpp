@@ -25,9 +25,9 @@ constexpr double kMaxForceError = 0.14;
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
 constexpr double kMaxThinShare = 0.02;  // of the stiffness of links at surfaces and where tissues meet
 
-// At surfaces and where tissues meet: share of the links' stiffness that belongs to tissue too thin to have a
-// cell of its own stiffness (LinkParts::thin). Coarse levels know cells only. Samples kRowsTried rows at
-// most.
+// Share of the links' stiffness that belongs to tissue only one voxel thick (LinkParts::thin), at surfaces
+// and where tissues meet. A cell is as stiff as the softest of its eight voxels, so such tissue has no cell
+// of its own stiffness. Coarse levels know cells only. Looks at kRowsTried rows at most.
 double thin_tissue_share(const Lattice& lattice) {
   constexpr RowId kRowsTried = 20000;
   const Grid& g = lattice.grid();
@@ -135,8 +135,9 @@ CompositeGrid::Suitability CompositeGrid::try_contacts() {
   return result;
 }
 
-// Do cycles without a tool come to rest fast enough? They start from a random state whose differences are at
-// most `most_m`.
+// Do cycles without a tool come to rest fast enough? They start from a random state in which neighbours
+// differ by at most `most_m`. The first kFirst of kCycles cycles do not count: smoothing removes most of the
+// random state at once.
 bool CompositeGrid::converges_at(const Index3& place, float most_m) noexcept {
   constexpr int kFirst = 3, kCycles = 10;
   begin(place);
