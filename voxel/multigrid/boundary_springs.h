@@ -32,7 +32,7 @@ class BoundarySprings {
     bool operator==(const Support&) const = default;
     [[nodiscard]] bool slides() const { return by == By::obstacle || by == By::tool; }
   };
-  static constexpr int kUnit = 127;
+  static constexpr int kUnit = 127;  // length of Support::n
   [[nodiscard]] static Support along(const glm::vec3& normal, Support::By what) noexcept;
   static constexpr Support kAll{Support::By::all, {}};
 
@@ -101,7 +101,7 @@ class BoundarySprings {
     std::vector<Record> records;
     std::vector<float> values;
   };
-  static constexpr std::uint8_t kWaits = 0x80;
+  static constexpr std::uint8_t kWaits = 0x80;  // bit of row_held: springs of anchors are not stored yet
 
   struct Found {  // springs of one cell; members as in Level
     Through through{};

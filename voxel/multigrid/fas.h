@@ -303,7 +303,7 @@ class Multigrid {
     std::uint8_t stopped = 0;      // bits: axes on which a limit holds it
     glm::dvec3 frozen_N{0.0};      // load that freezes its residual
   };
-  static constexpr std::size_t kMaxBlockBounds = 1024;
+  static constexpr std::size_t kMaxBlockBounds = 1024;  // bounds of one block, at most
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }

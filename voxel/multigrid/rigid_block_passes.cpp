@@ -89,7 +89,7 @@ glm::dvec3 Multigrid::block_force(std::size_t block, const Displacement& state) 
 // link.
 template <class Room>
 Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t block, const Room& room) const noexcept {
-  constexpr double kUnlimited = 1e30;
+  constexpr double kUnlimited = 1e30;  // (m)
   AdmissibleInterval all{{{-kUnlimited, kUnlimited}, {-kUnlimited, kUnlimited}, {-kUnlimited, kUnlimited}}};
   for (const RigidBlocks::Link& l : blocks_->on(0, block).border) {
     for (int axis = 0; axis < 3; ++axis) {

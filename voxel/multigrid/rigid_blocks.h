@@ -120,8 +120,9 @@ class RigidBlocks {
   struct Level {
     std::vector<OnLevel> blocks;
     LazyArray<std::uint16_t> number;  // [cell]; empty on level 0
-    std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled: has no other cells
+    std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled, kFilledKnown; 0: has none
   };
+  // kFilled: the row has cells of blocks only. kFilledKnown: and the next coarser level knows all of them.
   static constexpr std::uint8_t kFilled = 2, kFilledKnown = 3;
   // A cell, and how many voxels of one block it holds.
   struct Share {

@@ -126,6 +126,7 @@ HYBRID_MULTIVERSIONED_512 bool all_ones(const float* lanes, int groups) noexcept
 
 HYBRID_MULTIVERSIONED_512 void sum_interpolated(const std::array<ProlongedRow, 4>& rows, LaneSpan span,
                                                 RowVector& out) noexcept {
+  // Trilinear weights: (3/4)², 3/4 · 1/4, 1/4 · 3/4, (1/4)². The rows hold their interpolation along x.
   static constexpr std::array<float, 4> kShare{0.5625F, 0.1875F, 0.1875F, 0.0625F};
   bool whole = true;
   for (const ProlongedRow& r : rows) whole = whole && r.weight == nullptr;

@@ -7,8 +7,8 @@
 namespace voxel {
 namespace {
 
-constexpr int kCoarsestSweeps = 8;
-constexpr int kContactSweeps = 4;  // sweeps on the coarsest level, under asynchronous relaxation
+constexpr int kCoarsestSweeps = 8;  // sweeps on the coarsest level of a cycle
+constexpr int kContactSweeps = 4;   // the same for a contact cycle under asynchronous relaxation
 // Levels of a contact cycle under asynchronous relaxation. The shadow relaxes tissue further away. If contact
 // cycles moved the coarsest cells, too, they would disturb the shadow's cycles, and conversely.
 constexpr int kContactLevels = 5;
