@@ -23,9 +23,9 @@ constexpr double kContactStiffness = 1e5;
 constexpr double kSamePlane = 1e-9;  // 1 − cosine of the angle between normals of the same plane
 // Points nearer than this slide along their edges (unit: the smaller object's diagonal).
 constexpr double kSlideRange = 0.05;
-constexpr double kLeastSlide = 0.01;  // shorter slides are skipped (unit: the point's reach)
-constexpr double kStride = 0.02;      // step along a way (unit: the smaller object's diagonal)
-constexpr int kMostStrides = 32;
+constexpr double kLeastSlide = 0.01;                 // shorter slides are skipped (unit: the point's reach)
+constexpr double kStride = 0.02;                     // step along a way (unit: the smaller object's diagonal)
+constexpr int kMostStrides = 32;                     // steps along one way, at most
 constexpr int kRounds = 6;                           // maximum repetitions of solving and following ways
 constexpr std::size_t kMaxCollisionQueries = 20000;  // exact queries a tick
 // Range within which a body that gives way is stopped (unit: the smaller object's diagonal).
