@@ -25,7 +25,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kAfterPath_s = 0.5;
+constexpr double kAfterPath_s = 0.5;         // a session goes on for this time after its path has ended
 constexpr double kWithHand_s = 60.0;         // a real device has no path that ends
 constexpr std::uint64_t kMomentEvery = 20;   // ticks between two candidates for the kept snapshot
 constexpr std::uint64_t kClearances = 1000;  // samples of the clearance in a session, about

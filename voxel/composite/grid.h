@@ -60,6 +60,8 @@ class CompositeGrid {
   };
   // Allocates.
   static Suitability suitability(const Lattice& lattice);
+  // kRefineAll: see the constructor. Half widths of patches: the least and the greatest one of level 0
+  // (voxels); that of all patches of a reference.
   static constexpr int kRefineAll = -1, kHalfWidth = 6, kMaxHalfWidth = 14, kReferenceHalfWidth = 24;
   // `half_width`: half width of level 0's patch (voxels). `coarse_half_width`: that of the other patches
   // (nodes). Both are rounded up to even numbers >= kHalfWidth. kRefineAll: level 0 covers the whole object,

@@ -102,7 +102,7 @@ CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
 // Trials at places all over the surface: cycles must converge to rest, and a pressed voxel must feel the
 // force that it feels with patches twice as wide.
 CompositeGrid::Suitability CompositeGrid::try_contacts() {
-  constexpr std::size_t kPlaces = 12;
+  constexpr std::size_t kPlaces = 12;  // trials, at evenly numbered surface voxels
   CompositeGrid wide(lattice_, 2 * kTrialHalfWidth, 2 * kHalfWidth);
   const auto surface = lattice_.surface();
   // Differences between neighbours stay below every limit, so that limits play no part.
@@ -160,8 +160,8 @@ bool CompositeGrid::converges_at(const Index3& place, float most_m) noexcept {
 
 // The steady force (N) on a voxel that is pushed along one axis from rest.
 double CompositeGrid::settled_press(const Index3& place, const glm::dvec3& push_m) noexcept {
-  constexpr int kRounds = 20, kCyclesOfRound = 10;
-  constexpr double kSettled = 1e-3;  // change in a round, as a share of the force
+  constexpr int kRounds = 20, kCyclesOfRound = 10;  // rounds at most, and cycles of each
+  constexpr double kSettled = 1e-3;                 // change in a round, as a share of the force
   std::array<bool, 3> axes{};
   axes[index(largest_axis(push_m))] = true;
   begin(place);

@@ -20,6 +20,7 @@ constexpr int kObstacleRounds = 3;
 // Bit i is set if lane i of a row is near a rigid surface. Eight lanes are tested at a time, because few of
 // them are near one.
 std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
+  // the lowest bit of each byte; the seven lowest bits of each byte
   constexpr std::uint64_t kOnes = 0x0101010101010101U, kLow = 0x7F * kOnes;
   static_assert(std::endian::native == std::endian::little);
   std::uint32_t lanes = 0;

@@ -220,7 +220,7 @@ class Relaxation {
   struct Planes {
     int first = 0, last = 0;
   };
-  static constexpr Planes kAllPlanes{0, 1 << 24};
+  static constexpr Planes kAllPlanes{0, 1 << 24};  // planes beyond the box do not count
   [[nodiscard]] int planes_of_step(int n) const noexcept;
   [[nodiscard]] int steps() const noexcept { return static_cast<int>(steps_now().size()); }
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {

@@ -14,8 +14,7 @@ namespace {
 constexpr int kMaxShrinks = 20;
 constexpr int kCrowded = 4;
 constexpr double kShrink = 0.125;
-constexpr double kCentreAhead =
-    0.6;  // distance ahead of the proxy at which a survey is centred (unit: margin)
+constexpr double kCentreAhead = 0.6;  // distance from the proxy to the centre of a survey (unit: margin)
 // Height above the surface at which a ball's survey is centred (unit: margin), but at most the ball's radius.
 // The survey then covers a larger ball of places, which reaches as far along the surface but has far fewer
 // elements within touching distance (reach_of()).

@@ -23,7 +23,7 @@ constexpr double kDropRange = 1.75;
 constexpr double kHoldGap = 0.1, kReleaseGap = 0.3;
 // A contact that is too far apart to press is queried once in this many ticks.
 constexpr std::size_t kFarContactTurns = 4;
-constexpr int kPairSweeps = 2;
+constexpr int kPairSweeps = 2;  // sweeps over all contacts in a tick
 // kAloneRounds: rounds in which an object that the tool does not press gives way alone. kAloneDepth: the
 // deepest overlap for which it does so (touching distances). Slow motion causes no deeper overlap.
 constexpr int kAloneRounds = 2;
