@@ -2,11 +2,12 @@
 // Boundary springs: the stiffness that fixed voxels (anchors, tool contacts, and obstacle contacts along
 // their normal) add to each coarse cell.
 //
-// A link from a free voxel to a fixed one is a spring between the free voxel's cell and the fixed place. On
+// A link from a free voxel to a fixed one is a spring between the free voxel's cell and the fixed voxel. On
 // the next coarser level this spring is in series with half a link of that level, because the middle of the
-// coarser cell is that much further away. So a fixed plane stays where it is on every level, and a single
-// fixed voxel holds a large cell by about the stiffness of one voxel in an infinite lattice (3.96 of its
-// links; Cserti, Am. J. Phys. 68, 2000). Each axis, and links in each direction, are treated independently.
+// coarser cell is that much further away. This has two consequences. A plane of fixed voxels is at the same
+// place on every level. A single fixed voxel holds a large cell with about the stiffness of one voxel in an
+// infinite lattice (3.96 times that of one of its links; Cserti, Am. J. Phys. 68, 2000). Each axis, and links
+// in each direction, are treated independently.
 #pragma once
 
 #include <array>

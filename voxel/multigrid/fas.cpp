@@ -114,9 +114,9 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
   if (level == 0 && (flags & active) != 0) tiles_.mark_dirty(g.row_coordinates(row));
 }
 
-// Notes that a row moved by `change` (m). A change too small for a sweep is still restricted, because small
-// forces on many voxels add up to a large one on the cell above. From each level to the next this force grows
-// by a factor of four.
+// Notes that a row moved by `change` (m). Even a change too small to need a sweep is restricted, because
+// small forces on many voxels add up to a large force on the cells above: four times as much on each coarser
+// level.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
   if (change <= restricted_m()) return;
   if (level == 0) bricks_.look_at(row);

@@ -94,8 +94,8 @@ HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& 
   take_least(wanted, in.high);
   wanted = in.low > in.high ? now : wanted;
 }
-// [d] The limits of a link need no check if its difference is smaller in size than this: a little less than
-// the tightest limit of the row.
+// [d] A link along d needs no check against its own limits if the difference of its ends is smaller in size
+// than this (m). It is a little less than the tightest limit in the row.
 struct Band {
   std::array<float, 3> most;
 

@@ -25,7 +25,8 @@ struct LevelRow {
   // [lane] bit `axis`: an active limit holds it on that axis; null: none
   const std::uint8_t* stopped = nullptr;
   // [axis] Boundary springs; all null if there are none. `hold`: their stiffness divided by that of all links
-  // of the cell, to be multiplied by hold_times. `held_at`: the place that they pull to.
+  // of the cell; it still has to be multiplied by hold_times. `held_at`: the displacement towards which they
+  // pull (m).
   std::array<const float*, 3> hold{};
   std::array<const float*, 3> held_at{};
   float hold_times = 1.0F;

@@ -267,8 +267,9 @@ glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& 
   for (const Contact& c : contacts) {
     if (c.feel->texture == nullptr) continue;
     const BodyFrame& frame = state.rigid[c.number].frame;
-    // Evaluated at the point of the surface under the device. A proxy held by friction or by another surface
-    // is elsewhere: its relief would push the hand over a way that the hand does not move, and add energy.
+    // The relief is evaluated at the point of the surface under the device, not at the proxy. Friction or
+    // another surface may hold the proxy elsewhere. The relief at the proxy would push the hand although the
+    // hand does not move over that relief, and so add energy.
     const double depth = glm::dot(state.proxy_m - device_m, c.normal);
     const glm::dvec3 over = device_m + (depth - world.contact_radius_m()) * c.normal;
     const TexturedContact contact{frame.to_body(over), c.normal * frame.rotation, c.force_N / k, k};
