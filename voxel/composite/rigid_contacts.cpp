@@ -8,9 +8,9 @@
 //
 // Axes are relaxed one after the other, so a contact is split. On the axis of its normal's largest component
 // it is a bound: the height of the plane at the node's place. On the other axes it is a load: the bound's
-// force times the slope of the plane. At the fixed point of cycles the force is along the normal, without
-// friction. A load covers half of its difference from the bound's force in each cycle. Otherwise the two
-// would oscillate where a plane rises steeply along a soft axis.
+// force times the slope of the plane. When the cycles have converged, the force is along the normal, so there
+// is no friction. A load covers half of its difference from the bound's force in each cycle. Otherwise the
+// two would oscillate where a plane rises steeply along a soft axis.
 //
 // Nodes keep their bounds even if nothing presses them on the plane. SoftObject::press_on_grid gives the
 // reason.

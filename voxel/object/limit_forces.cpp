@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Loads that pass through links at their limits: dependents of pressed voxels follow them, are felt through
-// them, and hold them.
+// Loads that pass through links at their limits. Dependents are voxels that such links tie to a pressed
+// voxel. They move with the pressed voxel when it withdraws, and their loads are part of the force on the
+// tool.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
