@@ -96,7 +96,7 @@ float row_way(const float* now, const float* was, float* way) noexcept;
 // of a mask are lanes.
 struct LinksAtLimits {
   // [d] lanes whose link up along d has its difference at the lower limit (at_low) or at the upper limit
-  // (at_high); down_…: likewise the link down
+  // (at_high). down_at_low, down_at_high: lanes whose link down along d is at its lower or upper limit.
   std::array<std::uint32_t, 3> at_low, at_high, down_at_low, down_at_high;
   std::uint32_t pulled_up, pulled_down;
   std::uint32_t movable;  // not anchored

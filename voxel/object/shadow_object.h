@@ -17,8 +17,8 @@
 // and the tick relaxes only the residual of its own motion. If the tick leaves X of its own residual and a
 // cycle of the thread leaves Y of the thread's residual, X + Y is left in total.
 //
-// Coarse cells are not exchanged: each side has its own. Changes too small to matter are deferred until all
-// is at rest.
+// Coarse cells are not exchanged: the object and the shadow have separate ones. Changes too small to matter
+// are deferred until all is at rest.
 //
 // Limits are never violated: the part of a row's motion that its links forbid is dropped, and the next
 // submission carries the actual state. After a jump of the tool the first results are of cycles on large

@@ -236,8 +236,9 @@ class Collisions : private CollisionQueries {
     }
     return true;
   }
-  // Adds a contact with the half-space that a point met on its way. The contact's gap is the one that the
-  // last solution leaves at the end of the way, but without the free bodies' motion in that solution.
+  // Adds a contact between a point and the half-space that it met on its way. The contact's gap is the
+  // distance at the end of the way, without the part that the free bodies' motion in the last solution
+  // contributes: the next solution finds this motion anew.
   void add_contact_on_way(BodyPair& pair, Side side, std::size_t i, const NearestSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const auto [from, to] = way_of(pair, side, i);
