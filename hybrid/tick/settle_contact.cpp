@@ -209,8 +209,9 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
       minimise_outside_rigid(world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)), [&] {
         bounds = tool_bounds(world, state, state.proxy_m, false, kSettings.soft_step, state.scratch.planes);
       });
-  // Notes the planes that stop the tool. Then moves the tool to the exit. Without a sure exit, moves the tool
-  // back to the start of the tick, unless it was deeper there.
+  // Notes the planes that stop the tool. Then moves the tool to the place found. If that place is not surely
+  // outside everything rigid, moves the tool back to its place at the start of the tick, unless it was deeper
+  // there.
   for (std::size_t i = least.rigid; i < state.scratch.planes.size(); ++i) {
     if (state.scratch.planes[i].offset > glm::dot(state.scratch.planes[i].normal, state.proxy_m))
       add_stop(state, state.scratch.planes[i]);
