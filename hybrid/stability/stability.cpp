@@ -93,8 +93,7 @@ class Plan {
   // soft tissue no coupling buzzes. The modulus is that of the first soft object; the other objects keep
   // their ratio to it.
   void soft() {
-    constexpr double kStiffCoupling_N_per_m =
-        20e3;  // N/m; alone it buzzes, so the row finds the softest tissue that does
+    constexpr double kStiffCoupling_N_per_m = 20e3;  // buzzes on a rigid wall; on which tissue does it?
     for (const double young : {1e3, 1e4, 1e5}) {
       for (const auto& [grip, name] : kGrips) {
         StabilityRow& row = add(StabilitySweep::tissue, Boundary::buzz, held_setting(model_, grip, 0));

@@ -270,8 +270,9 @@ class Sweeper {
     return true;
   }
 
-  // A step has too many planes. So the way ends at the plane `next`, as it was found. The way would reach the
-  // plane of the element's face later, but elements that were not examined yet may stand before that plane.
+  // For a step with too many planes: ends the way at the plane `next`, as it was found. The way would reach
+  // the plane of the element's face later, but elements that were not examined yet may stand before that
+  // plane.
   void end_way_before(const ProxyPlane& next) noexcept {
     const BodyFrame& frame = state_.rigid[next.object].frame;
     const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
