@@ -4,11 +4,12 @@
 // Full approximation scheme (FAS; Brandt 1977; Briggs, Henson & McCormick, A Multigrid Tutorial, chapter 6):
 // a coarse cell holds a displacement, not a correction. So a tick can solve the neighbourhood of the contact
 // on all levels. Further away it moves only the coarse cells, and later ticks prolong their corrections to
-// the voxels. A correction that is not prolonged yet is *pending*. Terms: a coarse cell stands for 2 × 2 × 2
-// cells of the finer level, its *children*; it is the cell *above* them. A *Float8* is a vector of 8
-// neighbouring values of a row. An *active limit* holds a voxel or cell on one axis: a link is at its limit,
-// and the net force pushes against that limit. The held voxel or cell does not move on that axis until the
-// limit is *released*.
+// the voxels. A correction that is not prolonged yet is *pending*.
+//
+// Terms: a coarse cell stands for 2 × 2 × 2 cells of the finer level, its *children*; it is the cell *above*
+// them. A *Float8* is a vector of 8 neighbouring values of a row. An *active limit* holds a voxel or cell on
+// one axis: a link is at its limit, and the net force pushes against that limit. The held voxel or cell does
+// not move on that axis until the limit is *released*.
 #pragma once
 
 #include <array>

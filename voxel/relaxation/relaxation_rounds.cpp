@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::uint64_t kLetGoEvery = 8;  // without gain, active limits are released once in this many rounds
 constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
-// The factor of boundary springs, boundary_scale_, is at least 1. A round without gain whose residual exceeds
-// kWorse times that of the round before multiplies the factor by kHarder, to kHardest at most. Any other
-// round multiplies it by kSofter.
+// The factor of boundary springs, boundary_scale_, is at least 1. A round whose residual exceeds kWorse times
+// that of the round before multiplies the factor by kHarder, to kHardest at most. Any other round, and the
+// first one after wake(), multiplies it by kSofter.
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // a residual below this share of the least one so far is a gain

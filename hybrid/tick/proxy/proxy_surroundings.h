@@ -2,6 +2,7 @@
 // The rigid objects around the proxy, for a sweep (proxy_sweep.h): which objects are near, in which range
 // this is known, and which element a straight way meets first. This knowledge is kept from tick to tick in
 // WorldState. The map and the meshes are queried only when the proxy leaves the known range.
+//
 // Terms: a *survey* queries one object for all elements that the proxy may touch while it moves by at most
 // the *margin*. Each element gets a plane between it and the *viewpoint*, a place of the proxy
 // (polygon::Neighbourhood). Planes that bound the present step are *held*.
