@@ -49,8 +49,8 @@ Moved lower_along_alike(float* row, float up, float down, float margin) noexcept
 
 // The part of a cone (wave.h) in one column of rows that are consecutive in y. Row 0 is the row at the y of
 // the cone's apex. A raising cone raises lane i of row n to at least apex + n·slope − fall[i], where fall[i]
-// is the fall within a row. The two halves of the rows (a cache line each) are written one by one. A half
-// ends before the first row in which its lane with the least fall is not raised by more than the margin. If
+// is the fall within a row. Each half of the rows (a cache line of each row) has an end of its own: it ends
+// before the first row in which the half's lane with the least fall is not raised by more than the margin. If
 // no link was violated before, voxels further from the apex are raised less, so the search for this row can
 // start at a guess.
 struct ConeColumn {
