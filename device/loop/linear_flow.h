@@ -12,9 +12,9 @@ namespace device {
 // The formulas give the change of y instead of y itself, so that a small change keeps its digits.
 struct LinearFlow {
   double time_s = -1.0;
-  double from_velocity_s = 0.0;       // g
-  double velocity_factor = 1.0;       // g'
-  double from_acceleration_s2 = 0.0;  // ∫ g
+  double from_velocity_s = 0.0;       // g at time_s
+  double velocity_factor = 1.0;       // g' at time_s
+  double from_acceleration_s2 = 0.0;  // integral of g from 0 to time_s
 };
 
 // Needs mass > 0, damping >= 0, stiffness >= 0 and a finite time >= 0. The relative error is below 1e-12 for

@@ -84,7 +84,8 @@ double passive_damping_at(const SampledLoop& loop, double stiffness_N_per_m, dou
 }
 
 double passive_damping(const SampledLoop& loop, double stiffness_N_per_m) {
-  // The expression is a polynomial of degree delay + 1 in cos θ. So many angles give its maximum to 1e-6.
+  // The expression is a polynomial of degree delay + 1 in cos θ. With kAngles angles its maximum is found to
+  // 1e-6.
   constexpr int kAngles = 4096;
   double most = 0.0;
   for (int n = 1; n <= kAngles; ++n) {

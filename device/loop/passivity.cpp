@@ -76,7 +76,7 @@ glm::dvec3 keep_passive(const PassivityOptions& options, PassivityState& state, 
   ++state.felt;
   state.depth_m = std::max(0.0, state.depth_m - expected_J / size);
   if (expected_J > 0.0) {
-    // A spring whose force is zero where the force began stores half of (force · depth).
+    // A spring whose force grows from zero over `depth_m` stores half of force · depth.
     const double stored_J = std::max(0.0, -state.given_J);
     const double needed_J = std::max(expected_J, 0.5 * size * state.depth_m);
     if (needed_J > stored_J) state.share = std::min(state.share, stored_J / needed_J);

@@ -54,8 +54,8 @@ struct SimulatedDeviceOptions {
   Mechanism mechanism = device::mechanism(DeviceModel::premium_1_5);
   HandModel hand{};
   HandTremor tremor{};
-  // Whole ticks (writes) between a written force and the motors, at most kMaxDelayTicks. Add a delay of the
-  // measurement too: after the first ticks both delays have the same effect on a loop.
+  // Whole ticks (writes) between a written force and the motors, at most kMaxDelayTicks. To simulate a delay
+  // of the measurement, add it here: after the first ticks both delays have the same effect on a loop.
   int delay_ticks = 0;
   // The motors switch off if no write has come for this long. Empty: no watchdog.
   std::optional<double> watchdog_s{};

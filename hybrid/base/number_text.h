@@ -21,7 +21,7 @@ inline std::string with_decimals(double value, int decimals) {
   return detail::number_text(value, std::chars_format::fixed, decimals);
 }
 
-// A number with at most so many digits, for example "1.25". Very large and small numbers: "1.25e+06".
+// A number with at most `digits` digits, for example "1.25". Very large and small numbers: "1.25e+06".
 inline std::string with_digits(double value, int digits) {
   return detail::number_text(value, std::chars_format::general, digits);
 }

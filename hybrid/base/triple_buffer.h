@@ -30,6 +30,7 @@ class TripleBuffer {
   }
 
  private:
+  // kFresh: bit of the word: the slot in it was not read yet. kIndex: mask of the number of the slot.
   static constexpr std::uint8_t kFresh = 4, kIndex = 3;
   std::array<T, 3> slots_{};
   std::atomic<std::uint8_t> middle_{1};

@@ -19,14 +19,14 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr double kTick = 1e-3;
+constexpr double kTick = 1e-3;         // duration of a tick (s)
 constexpr int kWide = 36, kHigh = 20;  // voxels of a block; a ball has the same width
 // Pa. Forces are some newtons, so the JND is a share of the force, not its floor.
 constexpr double kYoung = 1e5;
 constexpr double kAway = 0.5;  // spacings above the surface at which strokes begin and end
 // Share of the lattice's force scale; a reference with a smaller residual is at rest.
 constexpr double kTolerance = 1e-4;
-constexpr int kMostSettleCycles = 60;
+constexpr int kMostSettleCycles = 60;  // cycles in which a reference has to come to rest
 
 // Visits the device positions along the corners, one for each tick.
 template <class Visit>

@@ -22,8 +22,10 @@
 namespace hybrid::bench {
 namespace {
 
+// kBatch: queries that are timed together. kRounds: rounds in which the engines run in turns.
 constexpr std::size_t kBatch = 64, kRounds = 3;
-constexpr std::size_t kMostFound = 4096;
+constexpr std::size_t kMostFound = 4096;  // elements that a query may return
+// Brute force, and the tree of all voxels, are measured with at most twice this many elements.
 constexpr std::size_t kMostBrute = 1'000'000, kMostTreeOfAll = 1'000'000;
 constexpr std::array<OccupancyPattern, 3> kPatterns{OccupancyPattern::empty, OccupancyPattern::coherent,
                                                     OccupancyPattern::random};

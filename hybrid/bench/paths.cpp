@@ -13,13 +13,13 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kFirstPolar = 0.3, kLastPolar = kPi - 0.3;  // rad
-constexpr double kSpiral_s = 20.0;
-constexpr double kStep_m = 1e-4;  // step along polylines: 0.1 m/s
-constexpr int kPressTicks = 200;
-constexpr double kPressFrom_m = 0.010;  // start of a press above the sphere
-constexpr int kTapTicks = 20;           // ticks of the way in, and of the way out
-constexpr double kTapReach_m = 0.02;    // reach of a tap above and below the surface
-constexpr double kTapTurn = 0.3;        // tilt of a tap from the normal
+constexpr double kSpiral_s = 20.0;                           // duration of the spiral over the sphere
+constexpr double kStep_m = 1e-4;                             // step along polylines: 0.1 m/s
+constexpr int kPressTicks = 200;                             // ticks of a press from its start to its depth
+constexpr double kPressFrom_m = 0.010;                       // start of a press above the sphere
+constexpr int kTapTicks = 20;                                // ticks of the way in, and of the way out
+constexpr double kTapReach_m = 0.02;                         // reach of a tap above and below the surface
+constexpr double kTapTurn = 0.3;                             // tilt of a tap from the normal
 // Distance from the tool at which even the largest body is clear of it.
 constexpr double kSweep_m = 0.095;
 constexpr double kMiss_m = 0.03;  // greatest distance at which the body's middle passes the tool
@@ -165,6 +165,7 @@ GoalPath drape_path(double tool_radius_m, double speed_m_s, int ticks,
 }
 
 GoalPath edge_path(double tool_radius_m, int laps) {
+  // corners (m)
   static constexpr std::array<glm::dvec3, 9> kWay{{{-0.03, -0.02, 0.06},
                                                    {-0.03, -0.02, 0.045},
                                                    {0.045, 0.013, 0.045},
@@ -195,9 +196,11 @@ GoalPath edge_path(double tool_radius_m, int laps) {
 }
 
 GoalPath corner_path(double tool_radius_m, bool symmetric, int laps) {
-  constexpr int kHold = 500, kWiggle = 3000;
+  constexpr int kHold = 500, kWiggle = 3000;  // ticks in the corner; ticks of small motions there
+  // corners (m)
   static constexpr std::array<glm::dvec3, 4> kPlain{
       {{0.04, 0.0512, 0.02}, {0.04, 0.0512, -0.0053}, {-0.005, 0.0512, -0.0053}, {-0.005, -0.0047, -0.0053}}};
+  // corners (m); the way meets the three planes at the same time
   static constexpr std::array<glm::dvec3, 4> kSymmetric{
       {{0.04, 0.05, 0.02}, {0.04, 0.05, -0.005}, {-0.005, 0.05, -0.005}, {-0.005, -0.005, -0.005}}};
   const auto& c = symmetric ? kSymmetric : kPlain;

@@ -17,8 +17,8 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr double kBall_m = 0.002;
-constexpr double kPoint_m = 0.0;
+constexpr double kBall_m = 0.002;  // radius of the ball tool
+constexpr double kPoint_m = 0.0;   // radius of the point tool
 constexpr std::size_t kMostReferenceTriangles =
     3'000'000;                             // of the exact reference, which takes 1 kB a triangle
 constexpr std::size_t kLarge = 3'000'000;  // triangles: a shorter table
@@ -28,7 +28,7 @@ constexpr double kSlowest_m_s = 0.02;      // of a scene of size 1: a lap of `mo
 struct Budget {
   double cgal_s, no_map_s, judge_s, judge_baseline_s;
 };
-constexpr Budget kFull{1.5, 2.0, 1.0, 0.2};
+constexpr Budget kFull{1.5, 2.0, 1.0, 0.2};  // s, in the order of Budget's members
 constexpr Budget kQuick{0.1, 0.2, 0.05, 0.02};
 
 // Paths are made in a scene of size 1, and scaled. A mesh of a file keeps its size: the scale fits the paths
@@ -157,7 +157,7 @@ class Plan {
 // 1: the way goes on by the distance to the surface, until that is a billionth.
 std::optional<double> first_surface(const polygon::RigidSurface& surface, const glm::dvec3& direction,
                                     double scale) {
-  constexpr double kMet = 1e-9;
+  constexpr double kMet = 1e-9;    // distance at which the ray has met the surface (unit: `scale`)
   constexpr int kMostSteps = 500;  // along a grazed surface the steps are short
   double at = 1.1 * kSphereRadius_m * scale;
   for (int n = 0; n < kMostSteps && at > 0.0; ++n) {

@@ -16,6 +16,7 @@ constexpr double kDeep_m = 1e-5;    // below the inscribed sphere, or a file's m
 constexpr double kLeak_m = 1e-6;    // past a cube's face or a corner's plane by this much is inside
 constexpr double kSearch_m = 1e-3;  // around the proxy for its first-order optimum
 constexpr std::size_t kProbe = 16;  // ticks that are always judged, and tell what one costs
+// distance from the corner within which a leak is looked for (unit: the scene's scale)
 constexpr double kCornerSeen_m = 0.1;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {

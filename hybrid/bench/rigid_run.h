@@ -23,7 +23,7 @@ enum class Engine : std::uint8_t { hybrid, cgal_aabb, no_map };
 inline constexpr std::array kEngines{Engine::hybrid, Engine::cgal_aabb, Engine::no_map};
 const char* engine_name(Engine engine);
 
-inline constexpr double kStiffness_N_per_m = 1000.0;
+inline constexpr double kStiffness_N_per_m = 1000.0;  // of the coupling
 
 // A surface and what it took to build it; shared by all runs on the mesh.
 struct TimedSurface {

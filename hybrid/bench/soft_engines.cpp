@@ -102,9 +102,9 @@ class ClassicEngine : public WaveEngine {
   std::vector<glm::vec3> moves_;
 };
 
-constexpr int kLayer = 8;       // voxels
-constexpr double kLump = 10.0;  // voxels; half a period of the waves
-constexpr std::uint8_t kRandomLabels = 8;
+constexpr int kLayer = 8;                  // voxels
+constexpr double kLump = 10.0;             // voxels; half a period of the waves
+constexpr std::uint8_t kRandomLabels = 8;  // labels of the material "random"
 
 // Lumps: regions in which the sum of three waves at odd angles to the lattice is large or small.
 std::uint8_t lump_label(int i, int j, int k) {

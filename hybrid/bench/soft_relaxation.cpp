@@ -23,25 +23,25 @@ namespace hybrid::bench {
 namespace {
 
 constexpr double kDepth = 10.0, kRadius = 10.0;  // unit: spacing
-constexpr int kSweepsNear = 2;
-constexpr double kConverged = 0.01;
-constexpr double kAsked_us = 100e3;  // working time after which the force's error is stated
-constexpr int kMostRounds = 4000;
+constexpr int kSweepsNear = 2;                   // cycles of relax_near() in a tick
+constexpr double kConverged = 0.01;              // error of the force, as a share of the reference
+constexpr double kAsked_us = 100e3;              // working time after which the force's error is stated
+constexpr int kMostRounds = 4000;                // a measurement ends after this many rounds
 constexpr double kCalm = 1e-4;   // share of the force; a round is calm if the force changes by no more
 constexpr int kCalmRounds = 30;  // number of calm rounds in a row that ends the measurement
 constexpr double kReferenceTolerance = 1e-6;  // share of the lattice's force scale
-constexpr int kReferenceCycles = 200;
+constexpr int kReferenceCycles = 200;         // cycles of the reference, at most
 
 constexpr const char* kWideReference = "the same press, after 400 ticks on a grid of boxes 24 nodes wide";
-constexpr int kTicks = 400;
-constexpr double kTightSlack = 0.15;
+constexpr int kTicks = 400;           // of a press on nested patches
+constexpr double kTightSlack = 0.15;  // share of the rest length
 constexpr voxel::LinkMaterial tight_tissue(double young_Pa) {
   return {.young_Pa = young_Pa,
           .stretch_min = 1.0 - kTightSlack,
           .stretch_max = 1.0 + kTightSlack,
           .shear = kTightSlack};
 }
-constexpr voxel::LinkMaterial kFirm = tight_tissue(20e3), kLimp = tight_tissue(5e3);
+constexpr voxel::LinkMaterial kFirm = tight_tissue(20e3), kLimp = tight_tissue(5e3);  // of 20 and of 5 kPa
 
 struct Limits {
   const char* name;

@@ -13,6 +13,7 @@
 namespace hybrid::bench {
 namespace {
 
+// Slack as a share of the rest length; speed of the tool (m/s); its radius (m).
 constexpr double kSlack = 0.1, kSpeed = 0.5, kToolRadius = 8.0 * kSoftSpacing_m;
 constexpr double kMostDepth = 20.0;  // unit: spacing
 constexpr int kSamples = 1'000'000;  // of the force's error; enough for all ticks in which tissue is pressed

@@ -48,13 +48,15 @@ nlohmann::ordered_json to_json(const SoftRow& row);
 std::string soft_table_head();
 std::string soft_table_line(const SoftRow& row);
 
-// Growth of moved voxels and of times with relative deformation, depth / slack, by least squares over the
-// homogeneous waves along one axis. The thesis (chapter VI) states exponential growth. In the closed form the
-// moved voxels are an octahedron, whose volume grows with the cube of depth / slack.
+// How the number of moved voxels and the time of a wave grow with the relative deformation, depth / slack.
+// Only waves in one tissue along one axis count. A power law is a straight line in the logarithms of both
+// quantities. The line is fitted by least squares, and the exponent is its slope. The thesis (chapter VI)
+// states exponential growth, so an exponential is fitted, too. In the closed form of the wave the moved
+// voxels fill an octahedron, whose volume grows with the cube of depth / slack.
 struct Growth {
   std::size_t points = 0;
-  double moved_exponent = 0.0, moved_r2 = 0.0;                        // log moved over log(depth/slack)
-  double exponential_r2 = 0.0;                                        // log moved over depth/slack
+  double moved_exponent = 0.0, moved_r2 = 0.0;                        // line: log moved over log(depth/slack)
+  double exponential_r2 = 0.0;                                        // line: log moved over depth/slack
   std::optional<double> hybrid_time_exponent, classic_time_exponent;  // log p50 over log(depth/slack)
 };
 // Empty: there are fewer than three ratios.

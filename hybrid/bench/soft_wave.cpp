@@ -24,6 +24,7 @@ struct Engine {
   std::vector<double> us;
 };
 
+// Turns of product and baseline, and counted runs in a turn (tests/README.md).
 constexpr std::size_t kLeastTurns = 1, kMostTurns = 20, kRunsInTurn = 5;
 
 std::vector<Engine> engines_of(const std::vector<SoftEngine>& names) {

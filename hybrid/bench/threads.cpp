@@ -26,7 +26,7 @@ namespace {
 constexpr std::size_t kHogged = std::size_t{128} << 20U;  // bytes of each of two buffers
 // Bytes copied between two calls of `meanwhile`.
 constexpr std::size_t kPiece = std::size_t{1} << 20U;
-constexpr double kAsOftenAsItCan_hz = 1e6;
+constexpr double kAsOftenAsItCan_hz = 1e6;  // more often than a thread can make a surface
 
 // Copies memory until `stop` is set. Calls `meanwhile` about every 0.1 ms.
 template <class Meanwhile>

@@ -145,7 +145,7 @@ class Builder {
   // Visits the objects whose boxes are nearer to the box of object `own` than kClearance times its size.
   template <class Visit>
   void for_near(const std::vector<Box>& boxes, std::size_t own, const Visit& visit) const {
-    constexpr double kClearance = 0.25;
+    constexpr double kClearance = 0.25;  // share of the object's longest side
     const glm::dvec3 size = boxes[own].high - boxes[own].low;
     const double apart = kClearance * std::max({size.x, size.y, size.z});
     for (std::size_t o = 0; o < boxes.size(); ++o) {

@@ -41,9 +41,10 @@ struct Choice {
   std::string reason;
 };
 
-// The felt stiffness is that of tissue and coupling in series. It is limited by the stiffness that the device
-// can render, and by the stiffness from which on a hand perceives a surface as rigid. Voxels are not needed
-// if the felt stiffness of a rigid surface differs from it by less than a just noticeable difference.
+// The felt stiffness is that of tissue and coupling in series. Two bounds limit it: the greatest stiffness
+// that the device can render, and the stiffness from which on a hand perceives a surface as rigid. A rigid
+// surface is felt with the stiffness of the coupling, within the bounds. If the two felt stiffnesses differ
+// by less than a just noticeable difference, voxels are not needed.
 Choice choose(const Scene& scene, const SoftDescription& soft) {
   if (scene.tool.shape == Tool::Shape::punch) return {false, "a punch is felt by voxels alone"};
   const device::DeviceLimits limits = scene_limits(scene);

@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kOpposite_deg = 150.0;
+constexpr double kOpposite_deg = 150.0;  // median angle beyond which a sign must be wrong
 
 glm::dvec3 between(const std::vector<glm::dvec3>& values, std::size_t before, double share) {
   if (share == 0.0) return values[before];

@@ -241,7 +241,7 @@ std::string name_of_tissue(const LabelVolume& tissue, const LabelNames& names, c
   }
   std::stable_sort(largest.begin(), largest.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
-  constexpr std::size_t kNamed = 2;
+  constexpr std::size_t kNamed = 2;  // labels that the name of an object contains
   std::string name;
   for (std::size_t n = 0; n < largest.size() && n < kNamed; ++n)
     name += (name.empty() ? "" : "_and_") + largest[n].second.substr(0, 20);

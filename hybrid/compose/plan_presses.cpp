@@ -20,7 +20,7 @@ constexpr double kSoftDepth = 0.8;   // depth of a press beyond first contact wi
 constexpr double kBoneDepth = 0.25;  // the same on bone, which does not give way
 // Height above the obstacles between two presses; at least the tool's diameter.
 constexpr double kClearance_m = 0.01;
-constexpr double kHold_s = 1.0;
+constexpr double kHold_s = 1.0;  // time for which a press is held
 // Between two presses the tool strokes over the surface. Depth and spacing of the path's points are in tool
 // radii. The tool is lifted where the surface falls or rises by more than kSteep times the step.
 constexpr double kStrokeDepth = 0.25, kStrokeStep = 1.5, kSteep = 1.5;

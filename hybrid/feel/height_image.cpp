@@ -19,6 +19,7 @@ namespace hybrid {
 namespace {
 
 constexpr std::uintmax_t kMostFileBytes = std::uintmax_t{160} << 20U;  // 4096² pixels of four 16-bit channels
+// first bytes of every PNG file
 constexpr std::array<unsigned char, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {

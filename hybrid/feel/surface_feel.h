@@ -104,10 +104,10 @@ struct DampingState {
 // The damping force B·rate. It is at least −normal_N, the spring's force, so that the whole normal force
 // never pulls the tool in. It resists motion in both directions. Sampled damping is not passive by itself
 // (Colgate & Schenkel 1997). So the work of the hand on the damper is accounted, with an exponential memory
-// of kDampingMemory_s. If the damper has returned more than it received, it is suspended until it would have
-// earned twice the deficit. Each further suspension has to earn at least twice as much as the one before. So
-// the damper cannot feed an oscillation, however long the contact lasts. The next contact starts with an
-// empty account.
+// of kDampingMemory_s. If the damper has returned more energy than it received, it is suspended until it
+// would have received twice the deficit. In each further suspension this amount is at least twice that of the
+// suspension before. So the damper cannot feed an oscillation, however long the contact lasts. The next
+// contact starts with an empty account.
 inline constexpr double kDampingMemory_s = 0.05;
 // With `account` false, damping is always applied: plain sampled damping.
 double damping_force(DampingState& state, double normal_N, double depth_m, double damping_N_s_per_m,

@@ -246,8 +246,9 @@ class NetBuilder {
       net_.positions.push_back(position);
       net_.cells.push_back({i, j, k});
     }
-    // The lattice edges from corner 0. Each has four cells around it, and this cell is the last of them.
-    // To the neighbour before along each axis. Along z it is 0, because that neighbour is in below_.
+    // Visits the three lattice edges that begin at corner 0. Each has four cells around it, and this cell is
+    // the last of them. `step`: offset to the neighbour before it along each axis. Along z it is 0, because
+    // that neighbour is in below_.
     const std::array<std::size_t, 3> step{1, row_length_, 0};
     for (int axis = 0; axis < 3; ++axis) {
       if (solid(corners, 0) == solid(corners, 1 << axis)) continue;

@@ -28,6 +28,7 @@ struct CellRange {  // both inclusive
 // The geometry of cells and bricks, and the bitmap.
 class BrickGrid {
  public:
+  // log2 of the edge of a brick (cells), its edge, its number of cells
   static constexpr int kShift = 3, kEdge = 1 << kShift, kCells = kEdge * kEdge * kEdge;
 
   // `cell_m` must be positive and finite, else std::invalid_argument. `origin`: a point near the contents, so
@@ -136,6 +137,7 @@ class BrickGrid {
   }
 
  private:
+  // largest coordinate of a cell; places further out are clamped to it
   static constexpr double kFarthestCell = 1e9;
   static constexpr std::int32_t kUnits = 64;  // units of the bitmap along an edge
 

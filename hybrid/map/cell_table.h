@@ -201,12 +201,12 @@ class CellTable {
 
  private:
   static constexpr std::size_t kPlaces = 7;  // places of a chunk
-  static constexpr int kPassedShift = 56;
+  static constexpr int kPassedShift = 56;    // position of the count in a chunk's word
   static constexpr std::uint64_t kOnePassed = 1ULL << kPassedShift,
-                                 kMostPassed = 0xFF;  // the count saturates here
-  static constexpr std::uint64_t kOnes = 0x0101010101010101ULL;
+                                 kMostPassed = 0xFF;             // the count saturates here
+  static constexpr std::uint64_t kOnes = 0x0101010101010101ULL;  // the lowest bit of each byte
   static constexpr std::size_t kSpare = 8;  // a saving of less than 1/kSpare is not worth moving all entries
-  static constexpr std::size_t kMostPlaces = std::size_t{1} << 26;
+  static constexpr std::size_t kMostPlaces = std::size_t{1} << 26;  // places of the table
 
   [[nodiscard]] static std::uint64_t hash(const CellCoordinates& c) noexcept {
     return finalised(part(0, c[0]) ^ part(1, c[1]) ^ part(2, c[2]));

@@ -40,7 +40,9 @@ struct HugePages {
   }
 
  private:
+  // Bytes of a huge page, and of the smallest array that gets such pages.
   static constexpr std::size_t kPage = std::size_t{1} << 21, kLeast = 2 * kPage;
+  // Alignment of smaller and of larger arrays.
   static constexpr std::align_val_t kSmall{alignof(T) < 64 ? 64 : alignof(T)}, kLarge{kPage};
 };
 

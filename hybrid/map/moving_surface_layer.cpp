@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kFarthestDistrict = 1e9;
+constexpr double kFarthestDistrict = 1e9;  // largest coordinate; places further out are clamped to it
 
 double largest(const glm::dvec3& v) noexcept {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});

@@ -18,7 +18,7 @@ constexpr std::uint64_t kNoKey = ~std::uint64_t{0};
 
 // The cell's coordinates in one word; kNoKey if they are too large for it.
 std::uint64_t key_of(const CellCoordinates& cell) noexcept {
-  constexpr std::int32_t kHalf = 1 << 20;
+  constexpr std::int32_t kHalf = 1 << 20;  // coordinates −kHalf … kHalf − 1 fit into 21 bits
   std::uint64_t key = 0;
   for (const std::int32_t c : cell) {
     if (c < -kHalf || c >= kHalf) return kNoKey;

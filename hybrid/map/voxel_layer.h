@@ -52,7 +52,9 @@ class VoxelLayer {
   [[nodiscard]] bool validate() const;
 
  private:
+  // log2 of the edge of a block (cells), its edge, its number of cells
   static constexpr int kBlockShift = 2, kBlockEdge = 4, kBlockCells = 64;
+  // most occupied cells of a block whose links are stored without gaps
   static constexpr std::size_t kPacked = 25;
   // A full block's array is freed when fewer cells than this are occupied.
   static constexpr std::size_t kUnpackBelow = 17;

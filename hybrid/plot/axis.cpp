@@ -150,7 +150,7 @@ std::vector<double> nice_ticks(double from, double to, int wanted) {
 }
 
 std::string tick_text(double value, double step) {
-  constexpr int kMostDecimals = 12;
+  constexpr int kMostDecimals = 12;  // digits after the point
   const double size = std::max(std::abs(value), std::abs(step));
   if (std::abs(value) < 1e-9 * std::abs(step)) return "0";
   std::string digits;

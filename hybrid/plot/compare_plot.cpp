@@ -16,8 +16,8 @@ namespace hybrid {
 namespace {
 
 constexpr double kGapInLine = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kMostDepthPanels = 3;
-constexpr double kTurned_deg = 15.0;  // the panel of angles is drawn if an angle exceeds this
+constexpr std::size_t kMostDepthPanels = 3;  // contacts with a panel of force over depth
+constexpr double kTurned_deg = 15.0;         // the panel of angles is drawn if an angle exceeds this
 // Share of a contact's largest force; a pull beyond it is drawn with its sign.
 constexpr double kReversedShare = 0.1;
 constexpr double kShownOutside_m = 1e-3;  // force over depth begins this far outside the object

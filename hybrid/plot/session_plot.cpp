@@ -17,7 +17,7 @@ namespace {
 constexpr const char* kTouchedColour = "#eaf2e3";
 constexpr std::size_t kMostContacts = 6;  // lines of force over depth at most
 constexpr std::size_t kLookUpEvery = 10;  // ticks between two look-ups of the material beneath the tool
-constexpr std::uint8_t kNoPart = 255;
+constexpr std::uint8_t kNoPart = 255;     // the material is unknown
 
 std::vector<double> times_of(std::span<const TraceRow> rows) {
   std::vector<double> t;

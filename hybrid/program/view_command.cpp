@@ -24,8 +24,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSnapshotEvery_s = 1.0 / 60.0;
-constexpr double kScriptFrame_s = 1.0 / 30.0;  // session time of one frame of a scripted view
+constexpr double kSnapshotEvery_s = 1.0 / 60.0;  // session time between two pictures of a live view
+constexpr double kScriptFrame_s = 1.0 / 30.0;    // session time of one frame of a scripted view
 
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint64_t n) {
   return folder / fmt::format("frame-{:05}.png", n);

@@ -15,7 +15,7 @@ namespace hybrid {
 namespace {
 
 constexpr std::chrono::seconds kShown{6};  // time for which a message is shown
-constexpr int kMostNames = 10'000;
+constexpr int kMostNames = 10'000;         // numbers that are tried for a new file name
 
 }  // namespace
 

@@ -81,8 +81,8 @@ struct CutPlane {  // cuts away the half-space that the normal points into; scen
 struct VolumeSurfaceSource {
   std::filesystem::path file;
   std::vector<voxel::LabelRule> rules;  // which voxels are inside
-  // Does the surface lie between voxels, where the intensity passes an end of the only rule? Otherwise it
-  // follows the voxels. A grown surface always follows them.
+  // True: the surface lies between voxels, where the intensity passes an end of the range. This needs a
+  // single range in `rules`. False: it follows the sides of voxels. A grown surface always follows them.
   bool between_voxels = false;
   std::optional<double> spacing_m;
   double grow_m = 0.0;  // the surface is moved outward by this much

@@ -81,7 +81,7 @@ char lower(char c) {
 }  // namespace
 
 LatticeStiffness as_six_links(const Tissue& tissue) {
-  constexpr double kPoisson = 0.3;
+  constexpr double kPoisson = 0.3;  // see tissue_table.h
   return {tissue.young_Pa * (1.0 - kPoisson * kPoisson) / (1.0 - tissue.poisson * tissue.poisson), kPoisson};
 }
 

@@ -26,10 +26,10 @@ struct Tissue {
 // volume has a Poisson's ratio of 0.45, near the end of the range for which the lattice is calibrated.
 std::span<const Tissue> tissue_table();
 
-// Elastic constants for a tissue of six-link voxels. Such voxels are accurate for Poisson's ratios up to 0.3,
-// also in layers, and a fifth too soft at 0.45 (voxel/README.md). Objects on nested patches can have only one
-// ratio. So the ratio is 0.3, and Young's modulus is chosen to keep the contact modulus E/(1 − ν²), which a
-// tool feels.
+// Elastic constants for a tissue of six-link voxels. Where several tissues lie in layers, such voxels are
+// accurate for Poisson's ratios near 0.3, and a fifth too soft at 0.45 (voxel/README.md). An object on nested
+// patches can have only one ratio. So the ratio is 0.3, and Young's modulus is such that the contact modulus
+// E/(1 − ν²), which a tool feels, does not change.
 struct LatticeStiffness {
   double young_Pa = 0.0, poisson = 0.0;
 };

@@ -32,7 +32,7 @@ struct BlackBoxRow {
 // ring takes rows for a quarter of its length and then stops, so it holds ticks before and after the fault.
 class BlackBox {
  public:
-  static constexpr double kSeconds = 2.0;
+  static constexpr double kSeconds = 2.0;  // length of the kept record before a fault
 
   explicit BlackBox(double rate_hz);
 

@@ -32,6 +32,7 @@ namespace {
 // prove equilibrium. In a deep push with active limits all around, nothing may move from one cycle to the
 // next. Yet half of the load may not have reached the anchors, or may not be felt.
 bool carried_by_anchors(const World& world, const WorldState& state) noexcept {
+  // largest difference of the two forces: share of the felt force, but at least kLeast_N
   constexpr double kShare = 0.01, kLeast_N = 1e-3;
   if (!world.soft_pairs.empty()) return true;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {

@@ -16,7 +16,7 @@
 
 namespace hybrid {
 
-inline constexpr int kSlower = 10;
+inline constexpr int kSlower = 10;  // factor on the duration of the slow run
 // Below this speed the device counts as still: a tenth of a millimetre in 0.1 s.
 inline constexpr double kStill_m_per_s = 1e-3;
 

@@ -14,7 +14,7 @@
 namespace hybrid {
 namespace {
 
-constexpr int kPathSamples = 500;
+constexpr int kPathSamples = 500;  // places of the path that the box has to contain
 
 // Box around all places that the hand may want to reach: the path, and all objects enlarged by the tool's
 // radius.

@@ -25,7 +25,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kAfterPath_s = 0.5;
+constexpr double kAfterPath_s = 0.5;         // a session goes on for this time after its path has ended
 constexpr double kWithHand_s = 60.0;         // a real device has no path that ends
 constexpr std::uint64_t kMomentEvery = 20;   // ticks between two candidates for the kept snapshot
 constexpr std::uint64_t kClearances = 1000;  // samples of the clearance in a session, about
@@ -43,8 +43,9 @@ std::uint64_t hash_in(std::uint64_t hash, const glm::dquat& q) noexcept {
   return hash;
 }
 
-// Score of a moment for the kept snapshot. Contact with both rigid and soft objects counts most, then the
-// force.
+// Score of the present tick. The session keeps a snapshot of the tick with the highest score; the picture of
+// the session shows it. Each touched object adds its force on the hand (N), but at most 1. A tick that
+// touches both a rigid and a soft object gets 10 more, so that the picture shows such a tick if there is one.
 double moment_score(const World& world, const WorldState& state) {
   double score = 0.0;
   bool rigid = false, soft = false;

@@ -35,7 +35,7 @@ namespace hybrid {
 // outside. The proxy's centre is no nearer to a rigid object than the proxy's radius, within rounding.
 class TickInvariants {
  public:
-  static constexpr double kTissueShare = 0.005;
+  static constexpr double kTissueShare = 0.005;  // share of moved_J()
 
   // Call when the session begins. `world` must outlive this object.
   TickInvariants(const World& world, const WorldState& state);

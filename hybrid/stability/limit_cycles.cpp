@@ -17,8 +17,9 @@
 namespace hybrid {
 namespace {
 
+// Range of the search for the largest stable stiffness of a wall.
 constexpr double kSoftestWall_N_per_m = 20.0, kStiffestWall_N_per_m = 1e7;
-constexpr double kSoftestBuzz_N_per_m = 100.0;
+constexpr double kSoftestBuzz_N_per_m = 100.0;  // softest wall in the search for buzz
 constexpr double kDeepest_m = 2e-3;  // greatest depth of a press; so the force on a soft wall is smaller
 constexpr double kPressing_s = 0.3;  // time in which the hand presses
 constexpr double kSettling_s = 0.2;  // time in which the loop settles after the press
@@ -142,7 +143,7 @@ namespace {
 // Knocks the tool, waits for at least a second, and records the tool's depth over the next half second.
 void watch_knock(PressedScene& scene, const LoopSetting& setting, double stiffness, double press_N,
                  std::vector<double>& depth_m) {
-  constexpr double kLook_s = 0.5;
+  constexpr double kLook_s = 0.5;  // duration of the recorded motion
   // If the loop is mostly damping, the tool creeps back after a knock.
   const double wait_s = std::max(1.0, 12.0 * held_loop(setting).damping_N_s_per_m / stiffness);
   HeldLoop loop(scene, setting, stiffness, press_N);

@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSoftest_N_per_m = 1.0, kStiffest_N_per_m = 1e7;
+constexpr double kSoftest_N_per_m = 1.0, kStiffest_N_per_m = 1e7;  // range of the search
 constexpr double kPassiveStep = 1e-3;  // relative step of the stiffness at which the bisection ends
 constexpr int kRateMemory = 24;        // ticks; more than the 16 depths of the velocity's estimate
 
@@ -54,7 +54,7 @@ namespace {
 
 // A grid of motions that may draw energy out of the wall.
 std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& setting, double stiffness) {
-  constexpr double kDeepestPress_m = 1e-3;
+  constexpr double kDeepestPress_m = 1e-3;  // depth of the presses, at most
   const double step = setting.encoder_m();
   const double deep = std::min(kDeepestPress_m, scene.press_N() / stiffness);
   std::vector<DrivenMotion> all;

@@ -18,9 +18,10 @@
 namespace hybrid {
 namespace {
 
-constexpr std::array kDelays{0, 1, 2};
+constexpr std::array kDelays{0, 1, 2};  // of the loop (ticks)
 constexpr std::array kGrips{std::pair{device::Grip::loose, "loose"},
                             std::pair{device::Grip::medium, "medium"}, std::pair{device::Grip::firm, "firm"}};
+// a device that no hand holds
 constexpr device::HandModel kNobody{.mass_kg = 0.0, .damping_N_s_per_m = 0.0, .stiffness_N_per_m = 0.0};
 
 void add_theory(StabilityRow& row) {
@@ -92,7 +93,7 @@ class Plan {
   // soft tissue no coupling buzzes. The modulus is that of the first soft object; the other objects keep
   // their ratio to it.
   void soft() {
-    constexpr double kStiffCoupling_N_per_m = 20e3;
+    constexpr double kStiffCoupling_N_per_m = 20e3;  // buzzes on a rigid wall; on which tissue does it?
     for (const double young : {1e3, 1e4, 1e5}) {
       for (const auto& [grip, name] : kGrips) {
         StabilityRow& row = add(StabilitySweep::tissue, Boundary::buzz, held_setting(model_, grip, 0));
@@ -175,7 +176,7 @@ class Plan {
   template <class Setting>
   void curve(StabilitySweep sweep, const std::vector<Boundary>& kinds, double from, double to,
              Setting&& setting_at) {
-    constexpr int kPoints = 80;
+    constexpr int kPoints = 80;  // points of a curve of theory
     for (const Boundary kind : kinds) {
       for (const int delay : kDelays) {
         TheoryCurve& c = report.curves.emplace_back();
@@ -224,7 +225,7 @@ Scene with_young(Scene scene, double young_Pa) {
 
 // Measures the modulus at which the scene's tissue begins to buzz under a coupling of the row's stiffness.
 void measure_modulus(const Scene& scene, StabilityRow& row) {
-  constexpr double kSoftest_Pa = 1e3, kStiffest_Pa = 1e8;
+  constexpr double kSoftest_Pa = 1e3, kStiffest_Pa = 1e8;  // range of the search
   row.stiffest = kStiffest_Pa;
   row.measured = find_threshold(kSoftest_Pa, kStiffest_Pa, 1.6, 2e-2, [&](double young) {
     PressedScene pressed(with_young(scene, young));
@@ -352,7 +353,7 @@ Agreement agreement(const StabilityReport& report, Boundary kind) {
 }
 
 int below_bound(const StabilityReport& report) {
-  constexpr double kPrecision = 5e-3;
+  constexpr double kPrecision = 5e-3;  // of a measured stiffness (relative)
   return static_cast<int>(std::count_if(report.rows.begin(), report.rows.end(), [](const StabilityRow& row) {
     return row.lower_bound && row.measured && *row.measured < *row.lower_bound * (1.0 - kPrecision);
   }));

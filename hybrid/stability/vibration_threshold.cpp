@@ -27,6 +27,7 @@ double line_power(std::span<const double> x, std::size_t k) {
 }  // namespace
 
 double vibration_threshold_m(double frequency_hz) noexcept {
+  // Amplitude below kKnee_hz; the threshold falls up to kFlat_hz, and is used up to kEnd_hz.
   constexpr double kLow_m = 25e-6, kKnee_hz = 30.0, kFlat_hz = 300.0, kEnd_hz = 1000.0;
   if (!(frequency_hz <= kEnd_hz)) return std::numeric_limits<double>::infinity();
   const double octaves = std::log2(std::clamp(frequency_hz, kKnee_hz, kFlat_hz) / kKnee_hz);

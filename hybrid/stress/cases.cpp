@@ -8,7 +8,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kThousandKilometres = 1e6;
+constexpr double kThousandKilometres = 1e6;  // m
 
 bool has_soft(SceneKind kind) {
   return kind != SceneKind::rigid;

@@ -37,7 +37,7 @@ constexpr std::size_t kQuickEvery = 7;  // the quick run takes every seventh cas
 // Has the text the form "…scene.toml:12:8: what; what to do"?
 bool says_where_what_and_remedy(const std::string& text) {
   constexpr std::string_view kFile = "scene.toml:";
-  constexpr std::size_t kFewWords = 8;
+  constexpr std::size_t kFewWords = 8;  // characters that a description, or a remedy, has at least
   std::size_t at = text.find(kFile);
   if (at == std::string::npos) return false;
   at += kFile.size();

@@ -25,10 +25,11 @@
 namespace hybrid {
 namespace {
 
-constexpr std::uint64_t kEpisode = 1000;
-constexpr int kMostTicksToRest = 4000;
-constexpr std::size_t kMostFailures = 20;
-constexpr double kUnit_m = 1e-3, kJump_m = 1.0;
+constexpr std::uint64_t kEpisode = 1000;         // ticks of random input before all is left to come to rest
+constexpr int kMostTicksToRest = 4000;           // ticks in which all has to come to rest
+constexpr std::size_t kMostFailures = 20;        // failures that are listed
+constexpr double kUnit_m = 1e-3, kJump_m = 1.0;  // unit of the scene; size of a jump
+// Depth in something rigid, and time of a tick, beyond which a failure is reported.
 constexpr double kMostInside_m = 1e-9, kLongFuzzTick_us = 1e6;
 
 constexpr const char* kMoving =

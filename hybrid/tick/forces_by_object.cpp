@@ -9,8 +9,8 @@
 namespace hybrid {
 namespace {
 
-// Stiffness of tissue that stopped the tool (unit: the tool's stiffness): as good as rigid, compared with
-// tissue that gives way.
+// Stiffness of tissue that stopped the tool (unit: the tool's stiffness). It is so large that the tissue
+// counts as rigid beside tissue that gives way.
 constexpr double kJammedStiffness = 1e3;
 // Stiffness added for any object near the tool (unit: the tool's stiffness). It is less than that of a
 // pressed voxel. It makes the sum of stiffnesses regular, so that every part of the force belongs to an

@@ -21,9 +21,10 @@ struct ContactSettings {
   double soft_step = 0.25;  // longest step of the proxy against tissue in one pass (unit: the tool's reach)
   double arrived = 1e-2;    // a later pass that moves the proxy less is the last (unit: the tool's radius)
   double still = 1e-5;      // a pass that moves the proxy less gives no secant (unit: the tool's radius)
-  // Settings of the learnt stiffness. kept: share kept from pass to pass. least_overshoot: smaller ones are
-  // ignored (unit: the pull before the step). most_overshoot: larger ones are clamped. most_learnt: bound of
-  // the result (unit: the model's stiffness).
+  // Settings of learn_stiffness(). kept: share of the learnt stiffness that is kept from pass to pass.
+  // least_overshoot: a smaller overshoot is ignored (unit: the pull before the step). most_overshoot: a
+  // larger one is clamped to it. most_learnt: upper bound of the learnt stiffness (unit: the model's
+  // stiffness).
   double kept = 0.9, least_overshoot = 0.25, most_overshoot = 3.0, most_learnt = 50.0;
   double probe = 0.005;  // how far the proxy probes jammed tissue once a tick (unit: the tool's radius)
   // Search radii for rigid planes when tissue stops the proxy (unit: the tool's radius). The second radius is
@@ -66,9 +67,9 @@ struct OutsideRigid {
   bool sure = false;      // feasible, and no rigid plane beyond the search radius can change it
 };
 
-// The minimum of the metric about `target`, outside rigid objects near the proxy and outside the planes that
-// add_others() appends to scratch.planes. Every rigid plane that the search missed is further from the proxy
-// than the search radius. A minimum nearer than that is therefore the minimum among all planes.
+// The point nearest to `target` in the metric, outside rigid objects near the proxy and outside the planes
+// that add_others() appends to scratch.planes. Rigid planes are searched up to a radius around the proxy. If
+// the point found is nearer to the proxy than that, no plane that was missed can change it.
 template <class AddOthers>
 OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const glm::dvec3& target,
                                     const polygon::Metric& metric, AddOthers&& add_others) noexcept {
@@ -206,8 +207,9 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
       minimise_outside_rigid(world, state, state.proxy_m, polygon::Metric(glm::dmat3(1.0)), [&] {
         bounds = tool_bounds(world, state, state.proxy_m, false, kSettings.soft_step, state.scratch.planes);
       });
-  // Notes the planes that stop the tool. Then moves the tool to the exit. Without a sure exit, moves the tool
-  // back to the start of the tick, unless it was deeper there.
+  // Notes the planes that stop the tool. Then moves the tool to the place found. If that place is not surely
+  // outside everything rigid, moves the tool back to its place at the start of the tick, unless it was deeper
+  // there.
   for (std::size_t i = least.rigid; i < state.scratch.planes.size(); ++i) {
     if (state.scratch.planes[i].offset > glm::dot(state.scratch.planes[i].normal, state.proxy_m))
       add_stop(state, state.scratch.planes[i]);

@@ -42,6 +42,6 @@ ForceCourse play_slowly(const Scene& scene, const std::vector<std::string>& obje
 // The same motion, 1.5 times faster and moved by `offset_m`. It serves to confirm the choice, because no
 // setting was chosen on it.
 Motion other_motion(const Motion& motion, double rate_hz, const glm::dvec3& offset_m);
-inline constexpr double kOtherSpeed = 1.5;
+inline constexpr double kOtherSpeed = 1.5;  // factor on the speed of the motion
 
 }  // namespace hybrid

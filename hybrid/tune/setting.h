@@ -31,7 +31,7 @@ struct Setting {
   friend bool operator==(const Setting& a, const Setting& b) { return a.objects == b.objects; }
 };
 
-inline constexpr int kSpacingDigits = 7;
+inline constexpr int kSpacingDigits = 7;  // significant digits of a spacing in the scene's file
 
 // A soft object that may be tuned, and the values that its table has now.
 struct TunableObject {

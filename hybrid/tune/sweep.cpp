@@ -10,7 +10,7 @@ namespace {
 // Spacings of the sweep, as multiples of the scene's own.
 constexpr std::array kScales{0.75, 0.875, 1.0, 1.125, 1.25, 1.5, 1.75, 2.0,
                              2.25, 2.5,   3.0, 3.5,   4.0,  4.5, 5.0,  6.0};
-constexpr std::array kQuickScales{1.0, 1.25, 1.5, 2.0, 3.0, 5.0};
+constexpr std::array kQuickScales{1.0, 1.25, 1.5, 2.0, 3.0, 5.0};  // factors with --quick
 constexpr double kStep = 1.5;  // factor on the spacing of one object while the others stay
 
 void add_new(std::vector<Setting>& settings, const Setting& setting) {

@@ -42,7 +42,8 @@ struct TruthPlan {
   double floor_N = 0.04, dt_s = 1e-3;
 };
 
-// Runs a step of the search. A step has words, a weight (1: a session at the scene's own spacing) and work.
+// Runs one step of the search. `words` describe the step for the user. `weight` is its expected cost (1: a
+// session at the scene's own spacing). `work` does it.
 using Step = std::function<void(const std::string& words, double weight,
                                 const std::function<void(const Progress&)>& work)>;
 

@@ -23,9 +23,9 @@ constexpr double kFirstShare = 1.0 / 3.0;  // share of the contact that the firs
 constexpr double kMarginOfPart = 0.3, kMarginOfWhole = 0.1;
 // Timed sessions of each setting; odd, so that a median is one of them.
 constexpr std::size_t kPasses = 5, kQuickPasses = 3;
-constexpr double kMostTruthVoxels = 4e6;
-constexpr double kOtherWay = 0.5;        // spacings by which the confirming motion is moved sideways
-constexpr double kStaysInContact = 0.5;  // share of the contact that the confirming motion must keep
+constexpr double kMostTruthVoxels = 4e6;  // the truth is made coarser than kTruthScale if it had more voxels
+constexpr double kOtherWay = 0.5;         // spacings by which the confirming motion is moved sideways
+constexpr double kStaysInContact = 0.5;   // share of the contact that the confirming motion must keep
 
 // A setting under test, with the times of its ticks in each pass.
 struct Trial {

@@ -18,8 +18,8 @@ namespace {
 constexpr double kWidth = 960.0, kHeight = 620.0;
 constexpr double kLeft = 76.0, kRight = 930.0, kTop = 70.0, kBottom = 560.0;
 constexpr double kSmallestMark = 4.0, kLargestMark = 14.0;  // radius
-constexpr double kLetterWidth = 6.0;
-constexpr int kTicks = 16;
+constexpr double kLetterWidth = 6.0;                        // width of a letter
+constexpr int kTicks = 16;                                  // marks on an axis, at most
 constexpr double kMargin = 1.5;       // factor by which the axes exceed the outermost values
 constexpr double kLeastShown = 0.01;  // JND; a smaller error is drawn at this value
 constexpr const char* kGrey = "#b5bac1";

@@ -10,7 +10,7 @@ namespace hybrid {
 namespace {
 
 constexpr const char* kClosedFormGroup = "closed form";
-constexpr double kYoung_Pa = 10e3;
+constexpr double kYoung_Pa = 10e3;   // of all specimens
 constexpr double kShallow = 0.0025;  // depth of a ball in its radii; Hertz holds for small depths
 
 // Six links do not conserve volume, so ν is tested with bricks.

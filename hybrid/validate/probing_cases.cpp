@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFitDepth_m = 1e-3;      // E is fitted to the force at this depth
 constexpr double kClaimedDepth_m = 2e-3;  // the force at this depth is predicted
-constexpr double kFirstDepth_m = 0.5e-3;
+constexpr double kFirstDepth_m = 0.5e-3;  // the start of the contact is fitted to the force at this depth
 // Thickness and width of the samples are not published. The block is 16 mm (pork) or 20 mm (liver) thick.
 constexpr double kBlockWide = 8.0, kBlockDeep = 5.0;  // in radii of the ball
 
@@ -136,7 +136,7 @@ ValidationPanel panel_of(const ProbedTissue& tissue, const ForceCurve& bricks) {
       .ours = {},
       .series = {{.name = "measured: median and quartiles", .measured = {}}}};
   const Fit fit = fit_modulus(bricks, tissue);
-  constexpr int kSteps = 30;
+  constexpr int kSteps = 30;  // points of the drawn curve
   for (int n = 0; n <= kSteps; ++n) {
     const double depth_m = 3e-3 * n / kSteps;
     panel.x.push_back(1e3 * depth_m);
@@ -170,6 +170,7 @@ void add_deep_rows(const ForceCurve& bricks, double poisson, ValidationReport& r
 }  // namespace
 
 void add_probed_tissues(const ValidationOptions& options, ValidationReport& report) {
+  // Bricks get the ratio of tissue; for links see as_six_links() in hybrid/scene/tissue_table.h.
   constexpr double kPoissonOfBricks = 0.45, kPoissonOfLinks = 0.3;
   const int nodes = options.quick ? 6 : 10;
   say(options, "ex-vivo tissue under a ball, bricks");

@@ -15,7 +15,7 @@ namespace {
 // At rest no voxel has a larger residual force. Unit: the force that doubles the length of a link.
 constexpr double kAtRest = 1e-5;
 constexpr double kSteady = 1e-6;  // relative change of the energy in a cycle; a smaller change counts as rest
-constexpr int kMostCycles = 2000;
+constexpr int kMostCycles = 2000;  // cycles in which a specimen has to come to rest
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 // These limits are so wide that no link reaches them. So the specimen is elastic.
 constexpr double kShortest = 0.02, kLongest = 20.0, kMostShear = 20.0;

@@ -31,7 +31,7 @@ std::string verdict_words(const ValidationRow& row) {
 }
 
 const Table<ValidationRow>& validation_columns() {
-  constexpr std::size_t kCaseLetters = 62, kQuantityLetters = 52;
+  constexpr std::size_t kCaseLetters = 62, kQuantityLetters = 52;  // widths of two columns
   static const Table<ValidationRow> table({
       {{" case"},
        kCaseLetters + 1,

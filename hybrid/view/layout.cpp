@@ -9,8 +9,8 @@ namespace {
 
 // Lengths are in heights of body text (em).
 constexpr float kHeading = 4.4F;
-constexpr float kHelp = 1.9F;
-constexpr float kColumn = 25.0F;
+constexpr float kHelp = 1.9F;     // height of the line of help
+constexpr float kColumn = 25.0F;  // width of the column beside the scene
 // Least width of the scene; if it would be narrower, there is no column.
 constexpr float kLeastScene = 16.0F;
 constexpr float kColumnShare = 1.0F / 3.0F;  // most width of the column, as a share of the frame's width

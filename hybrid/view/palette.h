@@ -33,7 +33,7 @@ inline constexpr std::array<glm::vec3, 9> moved{{{0.267F, 0.005F, 0.329F},
                                                  {0.369F, 0.789F, 0.383F},
                                                  {0.678F, 0.864F, 0.190F},
                                                  {0.993F, 0.906F, 0.144F}}};
-inline constexpr float kOwnUntil = 0.02F, kRampFrom = 0.15F;
+inline constexpr float kOwnUntil = 0.02F, kRampFrom = 0.15F;  // shares of the scale, see above
 
 inline constexpr std::array<glm::vec3, 4> rigid{
     {{0.89F, 0.84F, 0.72F}, {0.78F, 0.77F, 0.74F}, {0.80F, 0.71F, 0.55F}, {0.66F, 0.68F, 0.72F}}};

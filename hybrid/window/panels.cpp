@@ -38,8 +38,9 @@ void hand_over(ImGuiIO& io, const UiInput& input) {
 }
 
 constexpr const char* kPanelName = "panel";
+// heights (unit: body text)
 constexpr float kForceChart_em = 7.0F, kTickChart_em = 6.0F, kStageRow_em = 1.25F;
-constexpr std::array<double, 3> kSpeeds{1.0, 0.1, 0.01};
+constexpr std::array<double, 3> kSpeeds{1.0, 0.1, 0.01};  // of the session, relative to real time
 
 ImVec4 colour_of(Ink ink, float alpha = 1.0F) {
   ImVec4 colour = ImGui::ColorConvertU32ToFloat4(ink);

@@ -23,7 +23,8 @@ struct ColumnRange {
 
 // Distribution of tick times, in bins whose limits have equal ratios.
 struct TickTimes {
-  static constexpr std::size_t kBins = 48;
+  static constexpr std::size_t kBins = 48;  // number of bins
+  // lower limit of the first bin, upper limit of the last one
   static constexpr double kFirst_us = 1.0, kLast_us = 10'000.0;
   std::array<std::uint64_t, kBins> bins{};
   std::array<double, kStages> stage_us{};  // mean time of each stage

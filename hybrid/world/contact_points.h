@@ -31,7 +31,7 @@ struct SurfacePoint {
   [[nodiscard]] bool has_ends() const { return ends[0] != ends[1]; }
 };
 
-inline constexpr std::size_t kMostSurfacePoints = 800;
+inline constexpr std::size_t kMostSurfacePoints = 800;  // points of one object, at most
 
 // Points of an object whose surface is `shape` (body frame): the centre of a ball, points on the axis of a
 // capsule, and otherwise the shape's vertices and points along its sharp edges. If there are more than

@@ -15,7 +15,7 @@ constexpr int kMaxSolves = 16;          // Newton steps without friction
 constexpr int kMaxFrictionSolves = 16;  // Newton steps with friction
 constexpr double kStickSpeed = 1e-5;    // m/s: regularises Coulomb's law; slower sliding counts as sticking
 constexpr double kSlipTolerance = 0.01, kForceTolerance = 0.1;  // relative tolerances of slip and pressure
-constexpr int kHalvings = 40;
+constexpr int kHalvings = 40;                                   // steps of a bisection
 constexpr double kFlatEnough = 0.1;  // the line search ends at this fraction of the initial slope
 
 double dot(const Twist& a, const Twist& b) noexcept {

@@ -24,7 +24,7 @@ struct ProxyPlane {
   bool flat = false;      // the element's own plane is `in_body`, wherever the proxy is
   bool touching = false;  // the proxy is known to lie on it at the end of the last sweep
 };
-inline constexpr std::uint32_t kMaxProxyPlanes = 32;
+inline constexpr std::uint32_t kMaxProxyPlanes = 32;  // planes of one step of the sweep
 
 // Range of one body's contacts in TickScratch::body_contacts; the first `springs` of them are springs (tool
 // and tissue links).

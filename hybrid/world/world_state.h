@@ -54,10 +54,10 @@ enum FaultBit : std::uint32_t {
   fault_tool_in_tissue = 1024,  // the tool's centre was in tissue that it did not press
 };
 
-inline constexpr std::size_t kMaxNear = 256;     // triangles considered at once
-inline constexpr std::size_t kMaxPlanes = 1024;  // rigid planes and give-way bounds
-inline constexpr std::size_t kMaxFacetContacts = 8192;
-inline constexpr std::size_t kMaxMapHits = 32768;  // map entries read in one look-up
+inline constexpr std::size_t kMaxNear = 256;            // triangles considered at once
+inline constexpr std::size_t kMaxPlanes = 1024;         // rigid planes and give-way bounds
+inline constexpr std::size_t kMaxFacetContacts = 8192;  // contacts between soft objects
+inline constexpr std::size_t kMaxMapHits = 32768;       // map entries read in one look-up
 
 // Per rigid object: its pose, and the separating planes cached around the proxy.
 struct RigidState {

@@ -35,7 +35,7 @@ struct Header {
 };
 
 std::size_t size_of(Scalar type) {
-  constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
+  constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};  // bytes, in the order of Scalar
   return kSizes.at(static_cast<std::size_t>(type));
 }
 

@@ -45,7 +45,7 @@ void mend_line_ends(std::span<char> text) {
 }
 
 void write_ply_dialect(PrescannedFile& prescanned, const std::string& faces) {
-  constexpr std::size_t kHeader = 256;
+  constexpr std::size_t kHeader = 256;  // bytes of the header, at most
   std::string& dialect = prescanned.dialect;
   prescanned.openmesh_extension = "ply";
   dialect.reserve(kHeader + prescanned.coordinates.size() + faces.size());

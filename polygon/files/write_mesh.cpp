@@ -28,7 +28,7 @@ class Pieces {
   explicit Pieces(const ByteSink& sink) : sink_(sink) {}
   [[nodiscard]] std::string& bytes() { return bytes_; }
   void pass_on_when_many() {
-    constexpr std::size_t kMany = std::size_t{1} << 16U;
+    constexpr std::size_t kMany = std::size_t{1} << 16U;  // bytes
     if (bytes_.size() >= kMany) pass_on();
   }
   void pass_on() {
@@ -71,7 +71,7 @@ void write_ply(const TriangleMesh& mesh, const ByteSink& sink) {
 }
 
 void write_stl_in_mm(const TriangleMesh& mesh, const ByteSink& sink) {
-  constexpr std::size_t kHeaderBytes = 80;
+  constexpr std::size_t kHeaderBytes = 80;  // of the STL format; their content is free
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
     throw std::length_error("STL cannot count " + std::to_string(mesh.triangles.size()) +
                             " triangles; write PLY");

@@ -12,7 +12,7 @@
 namespace polygon {
 namespace {
 
-constexpr std::size_t kMaxCount = 0xffffffffU;
+constexpr std::size_t kMaxCount = 0xffffffffU;  // triangles or vertices; the number itself means "none"
 
 }  // namespace
 

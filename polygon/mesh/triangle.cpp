@@ -11,7 +11,7 @@ namespace polygon {
 namespace {
 
 constexpr double kSmallestSquare = 1e-200;  // of a cross product's squared length; digits are lost below it
-constexpr double kDegenerateSineSquared = 1e-28;
+constexpr double kDegenerateSineSquared = 1e-28;  // sin² between two edges; below it the normal is rounding
 // Rounding turns a normal by about epsilon / sine (rad). This shifts a foot point by the same fraction of the
 // triangle's length: 0.5 % at a sine of 4e-14. If the sine is smaller than this bound, the edges are compared
 // too. They are at most half of the triangle's width away.

@@ -6,9 +6,11 @@
 namespace polygon {
 namespace {
 
-constexpr double kNearlyFlat = 0.134;  // 1 − cos 30°
+// Bounds of the bend at an edge that the proxy may cross (unit: 1 − cosine of the angle between the normals).
+// 0.134 is 30°. Below kFlat both triangles lie in one plane, and there is no edge to cross.
+constexpr double kNearlyFlat = 0.134;
 constexpr double kFlat = 1e-12;
-constexpr double kHysteresis = 0.05;
+constexpr double kHysteresis = 0.05;  // see nearer_side() (unit: bend · depth of the goal)
 
 }  // namespace
 

@@ -32,9 +32,9 @@ struct CrossableEdges {
 CrossableEdges crossable_edges_of(const RigidSurface& surface, std::uint32_t element,
                                   const SeparatingPlane& plane, double radius, double rounding) noexcept;
 
-// The side whose plane the goal violates least, or nullptr if none is better than the element itself. The
-// improvement must exceed a twentieth of what the bend can account for. This hysteresis keeps encoder noise
-// from moving a proxy back and forth over an edge.
+// The side whose plane the goal violates least, or nullptr if the goal violates the element's own plane less.
+// The difference must exceed a twentieth of bend · depth, with `depth` the goal's depth in the element's
+// plane. This hysteresis keeps encoder noise from moving a proxy back and forth over an edge.
 const CrossableEdges::Side* nearer_side(const CrossableEdges& edges, const glm::dvec3& goal) noexcept;
 
 // Path across an edge, nearest to the goal: within the element's plane to `top` on the line where the planes

@@ -9,7 +9,7 @@
 namespace polygon {
 namespace {
 
-constexpr int kMaxExchanges = 64;
+constexpr int kMaxExchanges = 64;  // planes that are added to the subset in turn, at most
 // Planes closer to parallel than this count as one: the sine of the angle between one normal and the span of
 // the others. Their intersection would be rounding error.
 constexpr double kParallel = 1e-9;

@@ -41,10 +41,13 @@ class Metric {
 };
 
 // The point nearest to `target` in the metric (q − t)ᵀ A (q − t), with A symmetric positive definite, in the
-// intersection of the planes' half-spaces. An LP-type problem (Sharir & Welzl 1992), solved exactly: the most
-// violated plane is added, and of all subsets of at most three planes that contain it, the cheapest valid one
-// with non-negative multipliers is kept. The distance grows with each exchange, so the loop ends; the number
-// of exchanges is bounded. A plane counts as violated beyond `tolerance` (unit: meter). Allocates nothing.
+// intersection of the planes' half-spaces. This is an LP-type problem (Sharir & Welzl 1992), solved exactly
+// by exchanges. There are at most three active planes. An exchange finds the plane that the present point
+// violates most. It solves for each subset of at most three planes that consists of this plane and of active
+// ones. Of the solutions that violate no active plane and have no negative multiplier, it keeps the one of
+// least cost; the planes of that subset become active. The distance grows with each exchange, so the loop
+// ends. The number of exchanges is bounded, too. A plane counts as violated beyond `tolerance` (unit: meter).
+// Allocates nothing.
 PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
                                 std::span<const ContactPlane> planes, double tolerance) noexcept;
 inline PlaneMinimum minimise_on_planes(const glm::dvec3& target, const glm::dmat3& metric,

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Second-order step for a ball on an edge or a corner, where the constraint plane turns as the ball moves. A
-// sequence of minima over fixed planes creeps if the goal is near the edge: each step reduces the remaining
-// distance by no more than the fraction h/r, with h the distance from edge to goal and r the ball's radius.
-// With the curvature in the model (Newton's method for the constrained minimum: Nocedal & Wright, Numerical
-// Optimization, 18.1) one step suffices.
+// Second-order step for a ball on an edge or a corner. The plane that separates the ball from the edge turns
+// as the ball moves. A sequence of minima over fixed planes is slow if the goal is near the edge: each step
+// reduces the remaining distance by at most the fraction h/r, with h the distance from edge to goal and r the
+// ball's radius. Newton's method for the constrained minimum (Nocedal & Wright, Numerical Optimization, 18.1)
+// takes the turning of the plane into account, and one step suffices.
 #pragma once
 
 #include <glm/mat3x3.hpp>

@@ -29,9 +29,9 @@ using ExactTraits = CGAL::AABB_traits<Kernel, Primitive>;
 using ExactTree = CGAL::AABB_tree<ExactTraits>;
 using ExactNode = CGAL::AABB_node<ExactTraits>;
 
-constexpr double kRoundingSlack = 1e-12;  // relative; covers a few roundings in double
-constexpr std::size_t kMostEquallyNear = 64;
-constexpr int kMostRays = 32;
+constexpr double kRoundingSlack = 1e-12;      // relative; covers a few roundings in double
+constexpr std::size_t kMostEquallyNear = 64;  // triangles that are compared exactly
+constexpr int kMostRays = 32;                 // rays that are tried until one meets no edge
 
 Kernel::Point_3 to_cgal(const glm::dvec3& p) {
   return {p.x, p.y, p.z};

@@ -7,7 +7,7 @@
 namespace polygon {
 namespace {
 
-constexpr int kMostIterations = 24;
+constexpr int kMostIterations = 24;  // steps of Newton's method
 // Normals count as dependent if the sine of their angle is smaller: the line common to their surfaces would
 // be rounding error. The subset without one of these normals is tried anyway.
 constexpr FineReal kDependent = 1e-9L;

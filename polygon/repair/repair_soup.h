@@ -12,7 +12,7 @@
 namespace polygon {
 
 struct RepairSoup {
-  static constexpr std::uint32_t kFilled = 0xffffffffU;
+  static constexpr std::uint32_t kFilled = 0xffffffffU;  // value in `number`: the triangle fills a hole
 
   TriangleMesh mesh;                  // no two vertices equal, no triangle with two equal corners
   std::vector<std::uint32_t> number;  // [triangle] index in the mesh as given, or kFilled

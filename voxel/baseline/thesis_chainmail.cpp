@@ -12,8 +12,8 @@ namespace voxel {
 namespace {
 
 constexpr std::size_t kMaxElements = std::size_t{1} << 29;  // the queue needs three bits for a direction
-constexpr std::size_t kPrefetchCandidates = 24;
-constexpr int kMapMargin = 8;  // cells of the map on each side of the object at rest
+constexpr std::size_t kPrefetchCandidates = 24;  // candidates of the queue that are prefetched ahead
+constexpr int kMapMargin = 8;                    // cells of the map on each side of the object at rest
 
 bool same(const LinkMaterial& a, const LinkMaterial& b) {
   return a.young_Pa == b.young_Pa && a.poisson == b.poisson && a.stretch_min == b.stretch_min &&

@@ -60,7 +60,7 @@ class ThesisChainMail {
   // Results of the last move(): number of candidates; were candidates dropped?
   [[nodiscard]] std::uint64_t candidates() const { return candidates_; }
   [[nodiscard]] bool gave_up() const { return gave_up_; }
-  static constexpr std::uint64_t kMaxRounds = 20;
+  static constexpr std::uint64_t kMaxRounds = 20;  // candidates per cell and direction
 
   // One round of the haptic thread (Fig 16); lengths in m in the volume frame. Looks up the tool's centre,
   // then six points at `radius` from it. The first point that finds an element moves it, or a nearer element

@@ -8,7 +8,7 @@
 namespace voxel {
 namespace {
 
-constexpr int kObstaclePasses = 8;
+constexpr int kObstaclePasses = 8;  // corrections of voxels in obstacles, at most
 // Margin of a wave (row_kernels.h), relative to the largest displacement of a source: 3.5 roundings of a
 // float. Other roundings add to the violations that a wave leaves.
 constexpr float kMargin = 2.1e-7F;

@@ -130,7 +130,7 @@ HYBRID_INLINE Moved along_alike(float* row, float up, float down, float margin) 
 
 // Half a row: one cache line, and one register of AVX-512.
 constexpr int kHalf = kRow / 2;
-constexpr int kConePrefetchRows = 12;
+constexpr int kConePrefetchRows = 12;  // rows ahead
 // A row that is raised by at least this many margins is raised by clearly more than rounding.
 constexpr float kClearMargins = 16.0F;
 using Line = float __attribute__((vector_size(4 * kHalf)));

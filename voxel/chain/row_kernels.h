@@ -47,11 +47,12 @@ Moved lower_along(float* row, const std::uint8_t* labels, const HalfLimits& up, 
 Moved raise_along_alike(float* row, float up, float down, float margin) noexcept;
 Moved lower_along_alike(float* row, float up, float down, float margin) noexcept;
 
-// A cone over one column of rows that are consecutive in y. A raising cone lifts lane i of row n to at least
-// apex + n·slope − fall[i]. Row 0 is the row at the y of the cone's apex. The cone is written in half rows (a
-// cache line each). Each half ends before the first row in which its lane with the least fall is not raised
-// by more than the margin. In a state without violations, voxels further from the apex are raised less. So
-// the search for the end can start at a guess.
+// The part of a cone (wave.h) in one column of rows that are consecutive in y. Row 0 is the row at the y of
+// the cone's apex. A raising cone raises lane i of row n to at least apex + n·slope − fall[i], where fall[i]
+// is the fall within a row. Each half of the rows (a cache line of each row) has an end of its own: it ends
+// before the first row in which the half's lane with the least fall is not raised by more than the margin. If
+// no link was violated before, voxels further from the apex are raised less, so the search for this row can
+// start at a guess.
 struct ConeColumn {
   float* own = nullptr;                     // row 0
   std::ptrdiff_t next = 0;                  // offset from a row to the one to prefetch (floats)

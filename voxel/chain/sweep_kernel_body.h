@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Innermost loop of a sweep, written in the functions of lanes8.h or lanes16.h. sweep_kernel.cpp includes
-// this file once for each width, within a namespace that uses one of the two. Hence it has no guard and no
-// namespace.
+// Innermost loop of a sweep, in functions of lanes8.h or lanes16.h. For each width, sweep_kernel.cpp includes
+// it in a namespace that uses one of the two. Hence it has neither guard nor namespace.
 // NOLINTBEGIN(llvm-header-guard)
 
 using RowValues = std::array<Floats, kVectors>;
@@ -241,7 +240,8 @@ HYBRID_INLINE bool revisits_x(const SweepTask& p, const RowNow& row) {
                          *row.x, p.margin);
 }
 
-// Relaxes a row. `y`: values of the row before it in y; on return those of this row, if it moved.
+// Moves a row as far as its limits require. `y`, `z`: displacements of the row before it in y and in z (m).
+// If any voxel of this row moved, `y` afterwards holds the displacements of this row.
 template <bool kRaise, int kRegisters, class Limits>
 HYBRID_INLINE Moved sweep_row(const SweepTask& p, const RowNow& row, Limits& by_y, Limits& by_z,
                               const RowValues& z, RowValues& y) {

@@ -7,8 +7,8 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kPrefetchRows = 12;
-constexpr std::size_t kMaxCones = 4;  // up to this many sources get a cone each; more get one sweep
+constexpr std::size_t kPrefetchRows = 12;  // rows ahead
+constexpr std::size_t kMaxCones = 4;       // up to this many sources get a cone each; more get one sweep
 
 }  // namespace
 

@@ -15,7 +15,7 @@ using composite::index;
 constexpr int kLevels = 12;  // levels of cubes
 // align_to() chooses an end if the voxel is further from the middle than size / (2 · kAlignFraction).
 constexpr int kAlignFraction = 4;
-constexpr int kMaxCubeEdge = 1 << (kLevels - 1);
+constexpr int kMaxCubeEdge = 1 << (kLevels - 1);  // edge of the largest cubes (cells)
 
 // Is there a cell on any side of a link with these parallels (link_stiffness.h)?
 bool has_cell(std::uint32_t parallels) {

@@ -87,7 +87,8 @@ class CoarseMaterial {
   // May there be an anchor in the box between p and q, widened by half of `span`? `span` sets the size of the
   // cubes that are looked up.
   [[nodiscard]] bool anchor_near(const Index3& p, const Index3& q, int span) const noexcept;
-  // Is there an anchor that does not lie in a side of the object that is anchored as a whole?
+  // Does the object have scattered anchors? An anchored voxel is scattered unless it lies in a side of the
+  // object's box whose voxels are all anchored.
   [[nodiscard]] bool has_scattered_anchors() const { return !anchor_faces_.empty(); }
   // A quarter of the face between an anchored voxel and its neighbour along d, which is not anchored. Each of
   // the four cells round their link has one quarter.

@@ -18,8 +18,8 @@ HYBRID_INLINE void fall_over(Float8& fall, const float* weight, float by) {
   fall = w > Float8{} ? Float8{} + by : none;
 }
 
-// Bounds of a row from its low end to its high end: y(i) = max(bound(i), y(i − 1) − fall(i)), as a scan with
-// three shifts within each vector (Hillis & Steele 1986).
+// Raises the bounds of a row from its low end to its high end: bound(i) becomes max(bound(i), bound(i − 1) −
+// fall(i)). Within a vector of 8 bounds this is a scan with three shifts (Hillis & Steele 1986).
 HYBRID_INLINE void sweep_row_up(float* bound, const float* weight, float by, int first, int last) {
   const Float8 no_bound = Float8{} + kNoBound, zero{};
   Float8 carried = no_bound;
@@ -121,9 +121,10 @@ HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
   }
 }
 
-// Nodes at a bound must move with the bound before the cycle. A cone of bounds is piecewise linear, so links
-// pull the nodes on it only where its planes meet. Smoothing alone would therefore move the cone by one node
-// a sweep. A node beyond its bound is moved onto the bound.
+// Before a cycle, nodes at a bound move with the bound, and nodes beyond their bound move onto it. Smoothing
+// alone would move them by only one node a sweep. The reason: bounds fall off linearly with the distance from
+// a pressed node, so the nodes at them form a cone with plane sides. On a plane side the links of a node
+// balance; they pull only where two sides meet.
 HYBRID_MULTIVERSIONED void follow_bounds(float* u, const float* at_bound, const float* lower,
                                          const float* negated_upper, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; n += kLanes) {

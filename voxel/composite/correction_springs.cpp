@@ -9,15 +9,16 @@ namespace {
 
 using composite::index;
 
-// Share of the weight of two full links. With at least this share a node needs no spring: in whole tissue the
-// fine level's stiffness against a prolonged correction is 9/16 of that of the node's own links.
+// A node needs no spring on an axis if its two links there have at least this share of the weight of two full
+// links. In tissue without gaps the coarse node's links are stiffer than the fine level: the fine level's
+// stiffness against a prolonged correction is only 9/16 of that of the node's own links.
 constexpr float kRegular = 0.999F;
 
 }  // namespace
 
-// Stiffness along d of the fine level against a prolonged unit correction of one coarse node. A link counts
-// by the squared difference of the interpolation weights at its ends, an anchor by the interpolation weight
-// of its node.
+// Stiffness along d with which the links of the fine level resist a correction of one coarse node, once it is
+// prolonged. A link counts by the squared difference of the interpolation weights at its ends, an anchor by
+// the interpolation weight of its node.
 CompositeGrid::ProlongedWeight CompositeGrid::prolonged_weight(const Level& fine, const Index3& node,
                                                                std::size_t d) const noexcept {
   std::array<std::array<float, 5>, 3> along{};  // interpolation weights at −2 … 2 fine nodes

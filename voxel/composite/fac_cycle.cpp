@@ -15,7 +15,7 @@ namespace {
 
 using composite::index;
 
-constexpr int kCoarsestSweeps = 10;
+constexpr int kCoarsestSweeps = 10;  // sweeps that solve the coarsest level, which has few nodes
 constexpr std::size_t kMaxAcross = std::size_t{composite::kMaxVectors} * kLanes;  // nodes of a row, at most
 
 }  // namespace

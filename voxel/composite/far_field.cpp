@@ -2,10 +2,10 @@
 // Displacements far from the contact: extrapolated before a cycle, fitted after it.
 //
 // Far from the contact, a cycle reduces the error only to about 0.6 of its size. The reason is that active
-// nodes do not move on coarser levels and hold the free nodes linked to them. But the error is nearly the
-// same share of the displacement everywhere. So after each cycle a multiple of one mode is added to u, on
-// each axis. The mode is the part of u that bounds do not prescribe (beyond_bounds()). The multiple is chosen
-// to minimise the energy.
+// nodes (row_kernels.h) do not move on coarser levels and hold the free nodes linked to them. But the error
+// is nearly the same share of the displacement everywhere. So after each cycle a multiple of one fixed
+// pattern of displacements, the mode, is added to u on each axis. The mode is the part of u that bounds do
+// not prescribe (beyond_bounds()). The multiple is that of least energy, times a factor (kOverrelaxation).
 #include <algorithm>
 
 #include "voxel/composite/grid.h"

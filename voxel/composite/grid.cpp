@@ -9,8 +9,8 @@ namespace {
 
 using composite::index;
 
-constexpr int kCoarsest = 5;  // nodes along the longest edge of the coarsest level, at most
-constexpr std::size_t kMaxPressed = 2048;
+constexpr int kCoarsest = 5;               // nodes along the longest edge of the coarsest level, at most
+constexpr std::size_t kMaxPressed = 2048;  // voxels in pressed_ at most; press() ignores further ones
 
 }  // namespace
 

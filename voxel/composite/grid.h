@@ -13,10 +13,10 @@
 // Shape. The stiffness of a link between two nodes follows from the tissue round it (coarse_material.h): on
 // level 0 it is that of the lattice, on coarser levels a mean. No link crosses a gap. Anchors hold nodes by
 // springs. Where a whole side is anchored, the distance to the anchor gives the spring. Elsewhere the spring
-// includes the constriction of the load that spreads from the anchors (scattered_anchors.cpp). The links of a
-// coarse level may be weaker than the finer level's resistance to its corrections. There springs shorten the
-// corrections (correction_springs.cpp). Tissues may differ in stiffness, but not in limits or Poisson's
-// ratio.
+// includes the constriction of the load that spreads from the anchors (scattered_anchors.cpp). A coarse level
+// may resist a correction less than the finer level does. Its corrections would then be too large, so there
+// springs shorten them (correction_springs.cpp). Tissues may differ in stiffness, but not in limits or
+// Poisson's ratio.
 //
 // Limits. In a convex body of one tissue the equilibrium within the chain limits solves an obstacle problem:
 // each node v lies between L = max(u(s) − dist(v→s)) and U = min(u(s) + dist(s→v)) over the pressed voxels s,
@@ -60,6 +60,8 @@ class CompositeGrid {
   };
   // Allocates.
   static Suitability suitability(const Lattice& lattice);
+  // kRefineAll: see the constructor. Half widths of patches: the least and the greatest one of level 0
+  // (voxels); that of all patches of a reference.
   static constexpr int kRefineAll = -1, kHalfWidth = 6, kMaxHalfWidth = 14, kReferenceHalfWidth = 24;
   // `half_width`: half width of level 0's patch (voxels). `coarse_half_width`: that of the other patches
   // (nodes). Both are rounded up to even numbers >= kHalfWidth. kRefineAll: level 0 covers the whole object,
@@ -88,8 +90,9 @@ class CompositeGrid {
   // Is the voxel an unknown of level 0?
   [[nodiscard]] bool in_fine_patch(const Index3& voxel) const noexcept;
 
-  // For a voxel in level 0's patch: its displacement (m); its displacement of least energy without bounds,
-  // with its neighbours fixed (m); its displacement per force on each axis, with its neighbours fixed (m/N).
+  // For a voxel in level 0's patch. fine_at(): its displacement (m). unconstrained_minimum(): the
+  // displacement at which its energy is least if it has no bounds and its neighbours do not move (m).
+  // compliance(): its motion by a force of 1 N on each axis if its neighbours do not move (m/N).
   [[nodiscard]] glm::dvec3 fine_at(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 unconstrained_minimum(const Index3& voxel) const noexcept;
   [[nodiscard]] glm::dvec3 compliance(const Index3& voxel) const noexcept;
@@ -127,8 +130,8 @@ class CompositeGrid {
   // itself, but by at most `most_m` (m).
   void extrapolate(std::size_t axis, double share, double most_m) noexcept;
   // Call both before a cycle. clear_pressed() removes all constraints of the tool's contact; press() adds
-  // one. A pressed voxel of level 0 may not move back against `normal` (unit vector, into the tissue) beyond
-  // `u` (m).
+  // that of one voxel of level 0. On each axis along which `normal` (unit vector, into the tissue) has a
+  // component above kAlong, the voxel may not move back beyond the displacement `u` (m).
   void clear_pressed() noexcept { pressed_.clear(); }
   void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One FAC cycle over all levels, on these axes.
@@ -182,8 +185,9 @@ class CompositeGrid {
     Index3 voxel;
     std::uint32_t surface;
   };
-  // Force of an obstacle along its normal (N), relaxed over the cycles, and the level of its node. The loads
-  // of the obstacle follow from this force.
+  // Force of an obstacle along its normal (N), and the level of the node that it bounds. In each cycle
+  // along_normal_N covers half of its difference from the force that the bound has. The loads of the obstacle
+  // on the axes other than that of its bound follow from along_normal_N.
   struct ObstacleLoad {
     float along_normal_N = 0.0F;
     std::uint32_t level = 0;
@@ -377,8 +381,9 @@ class CompositeGrid {
   std::vector<std::uint8_t> is_beside_rigid_;  // [surface number] 1: in beside_rigid_
   std::vector<ObstacleLoad> obstacle_loads_;   // [surface number]
   std::vector<ObstacleBound> obstacle_bounds_;
-  // Box round the voxels of supporting_bounds_ (coordinates), their greatest bound (m) and half of their
-  // widest step (voxels). supports_: [axis][kind].
+  // Summary of the supporting_bounds_ of one axis and one kind (0: least u, 1: least −u), for a quick test in
+  // clamp_to_obstacles(). low, high: box around their voxels (coordinates). most: their greatest bound (m).
+  // beyond: half of the widest distance between nodes of their levels (voxels).
   struct SupportBox {
     Index3 low{}, high{};
     float most = 0.0F;
@@ -391,8 +396,8 @@ class CompositeGrid {
   bool patch_moved_ = false;                      // a patch moved since the last cycle
   std::array<bool, 3> multipliers_active_{};      // [axis] some link has a multiplier
   std::size_t work_ = 0;
-  // One plane of half cells (half_cube()): the number of cells in each, and this number times their stiffness
-  // by axis.
+  // A half cell is a cube half as long as a link of the level (half_cube()). For one plane of half cells: the
+  // number of tissue cells in each, and this number times their stiffness along each axis.
   struct HalfCells {
     Floats cells;
     std::array<Floats, 3> stiffness;

@@ -27,15 +27,17 @@ struct AxisNodes {
   int base = 0;
   bool odd = false;
   std::vector<float> lane_weight;
-  // By coarse node: index of the node at its place, which may be one beyond either end; kOutside: further
-  // out.
+  // By coarse node: index of this level's node at the same place. −1 or `count`: that place is one node
+  // beyond an end of this patch. kOutside: it is further away.
   std::vector<int> fine;
   int coarse_first = 0, coarse_last = -1;  // coarse nodes strictly within this patch
   // By coarse node: restriction weights of the nodes before, at and after it.
   std::vector<float> restrict_low, restrict_own, restrict_high;
 };
-// By node: number of anchor faces that hold the node from one side; number of these faces that lie in a link;
-// sums over the faces of their distance (voxels), of constriction_of_face() and of their cell's stiffness.
+// The anchor faces (CoarseMaterial::AnchorFace) that hold each node from one side. By node: their number; the
+// number of those that lie within a link, not in the plane of the node; the sum over all of them of the
+// distance from anchored voxel to node (voxels); the sum of constriction_of_face(); the sum of
+// the stiffness of their cells, relative to the reference.
 struct AnchorFaces {
   Floats count, in_link, distance, constriction, stiffness;
 };
@@ -73,7 +75,7 @@ struct GridLevel {
   std::array<Floats, 3> weight, anchor_weight;
   // Only where tissues differ. shape_weight [d]: the weight if all tissue had the reference stiffness.
   // anchor_distance [d]: voxels to the anchor, negative if the anchor is behind the node. limited_…[axis][d]:
-  // the weights with multipliers.
+  // the weights with the multipliers of links at their limits (link_limits.cpp).
   std::array<Floats, 3> shape_weight, anchor_distance;
   std::array<std::array<Floats, 3>, 3> limited_weight, limited_anchor_weight;
   std::array<Floats, 3> inverse_diagonal, diagonal;  // [axis] of the stiffness matrix; inverse 0: fixed

@@ -18,8 +18,10 @@ namespace {
 
 using composite::index;
 
+// Upper bound of a link's weight with its multiplier (unit: weight of the link without multiplier).
 constexpr float kMaxFactor = 1e3F;
-constexpr float kTolerance = 2e-3F;  // relative to a limit
+// Links whose change of length is within this share of their limit count as being at the limit.
+constexpr float kTolerance = 2e-3F;
 
 }  // namespace
 

@@ -13,12 +13,15 @@ using composite::index;
 
 using composite::kNoBound;
 
+// Rounds of sweeps on a level with gaps or anchors: paths around a gap have more bends than one round
+// follows.
 constexpr int kRoundsRoundGaps = 2;
 
 }  // namespace
 
-// Box of the nodes of a level that the bounds of `pressed` (coordinates) can hold. Outside the box, bounds
-// have fallen by more than `fall_m`.
+// Box of the nodes of a level that bounds of pressed voxels may reach. `pressed`: box of these voxels
+// (coordinates). A bound falls from link to link along a chain. Outside of the returned box it has fallen by
+// more than `fall_m` (m), so that it holds no node.
 CompositeGrid::NodeBox CompositeGrid::reach_of_bounds(const Level& level, std::size_t a, std::size_t kind,
                                                       const NodeBox& pressed, float fall_m) const noexcept {
   NodeBox box;

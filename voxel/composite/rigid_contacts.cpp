@@ -8,9 +8,9 @@
 //
 // Axes are relaxed one after the other, so a contact is split. On the axis of its normal's largest component
 // it is a bound: the height of the plane at the node's place. On the other axes it is a load: the bound's
-// force times the slope of the plane. At the fixed point of cycles the force is along the normal, without
-// friction. A load covers half of its difference from the bound's force in each cycle. Otherwise the two
-// would oscillate where a plane rises steeply along a soft axis.
+// force times the slope of the plane. When the cycles have converged, the force is along the normal, so there
+// is no friction. A load covers half of its difference from the bound's force in each cycle. Otherwise the
+// two would oscillate where a plane rises steeply along a soft axis.
 //
 // Nodes keep their bounds even if nothing presses them on the plane. SoftObject::press_on_grid gives the
 // reason.
@@ -265,15 +265,17 @@ bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
   return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// Fall of a bound (m) along the chains from the box low … high to the place `at` (coordinates). A coarse node
-// stands for all voxels within half a step (`beyond`) in the directions across the bound's axis.
+// By how much a bound falls (m) along the shortest chain of links from the box low … high to the place `at`
+// (coordinates). A node of a coarse level stands for all voxels up to `beyond` voxels (half a step) away
+// across the bound's axis, so that many links do not count.
 double CompositeGrid::fall_from(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
                                 const Index3& high, int beyond) const noexcept {
   double fall = 0.0;
   for (std::size_t d = 0; d < 3; ++d) {
     const int above = at[d] - high[d], below = low[d] - at[d];
     const int links = std::max({above, below, 0}) - (d == axis ? 0 : beyond);
-    // For a link from a up to b: u(b) >= u(a) − limit[0] and u(a) >= u(b) − limit[1]; for −u the reverse.
+    // For a link from a up to b: u(b) >= u(a) − limit[0] and u(a) >= u(b) − limit[1]. For −u the two limits
+    // change places.
     if (links > 0) fall += links * static_cast<double>(limit_m_[d][axis][(above > 0 ? 0U : 1U) ^ kind]);
   }
   return fall;

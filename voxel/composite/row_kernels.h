@@ -62,7 +62,7 @@ void link_forces_of_level(const LevelView& view, const std::array<int, 3>& first
 struct LinkMultiplier {
   float per_longer, per_shorter;  // 1 / limit (1/m)
   float tolerance;                // links with a ratio of 1 ± this are at the limit
-  float max_factor;               // largest limited weight / weight
+  float max_factor;               // upper bound of limited weight / weight
 };
 // Largest limit ratio of the links from nodes to the nodes `by` floats further on.
 [[nodiscard]] float largest_limit_ratio(const float* u, const float* weight, std::size_t by,

@@ -17,11 +17,11 @@ constexpr float kLeastResistance = 0.01F;
 
 }  // namespace
 
-// Finds the two nodes of an anchor's face. `held`: the node that the face holds; along d it lies in the plane
-// of the anchored voxel or next to it on the tissue's side. `nearest`: the nearest node along d. In the other
-// directions both nodes lie on the line of links whose tissue includes the face's cell. If there is no link
-// at `held`, both are the nearest node with links. `distance`: from the anchored voxel to `held` along d
-// (voxels). False if there is no such node.
+// Finds the two nodes that belong to a quarter of an anchor's face. `held` is the node that the face holds:
+// along d, the first node at or beyond the anchored voxel on the tissue's side. `nearest` is the node nearest
+// to the anchored voxel along d. Across d, both lie on the line of links whose tissue includes the face's
+// cell. If `held` has no link, both are the nearest node that has one. `distance`: from the anchored voxel to
+// `held` along d (voxels). Returns false if there is no such node.
 bool CompositeGrid::nodes_of_face(const Level& level, const CoarseMaterial::AnchorFace& face,
                                   std::size_t& held, std::size_t& nearest, int& distance) noexcept {
   const std::size_t d = face.d;
@@ -108,8 +108,9 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
   }
 }
 
-// Resistance from a face to tissue far away. The A faces of a cell together act like a sphere of area A. If
-// only a part of the cell is tissue, they act like that part of a larger sphere.
+// Resistance from one face to tissue far away (unit: that of a link between voxels). The faces of a cell, A
+// in number, together act like a sphere of area A within tissue. If only a part of the cell is tissue, they
+// act like the same part of the surface of a larger sphere.
 float CompositeGrid::constriction_of_face(const Level& level, std::size_t cell) const noexcept {
   float links = 0.0F;
   for (std::size_t d = 0; d < 3; ++d)
@@ -118,11 +119,12 @@ float CompositeGrid::constriction_of_face(const Level& level, std::size_t cell) 
   return std::sqrt(faces_of_cell_[cell] / (4.0F * std::numbers::pi_v<float> * part));
 }
 
-// Weight by which N of the s² faces of a cell hold a node. In series with the faces lie the tissue between
-// them and the node, and the constriction of the load that spreads from N faces to s². The constriction has
-// the factor (1 − ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² the weight is that of
-// the chain of links. The faces' cells are as stiff as their mean: tissue beside them that does not touch an
-// anchor does not count.
+// Weight of the spring by which N of the s² faces of a cell hold a node. Three resistances are in series. The
+// first is that of the tissue between the faces and the node. The second is that of the links at the faces,
+// of which there are N instead of s². The third is the constriction: the load has to spread from N faces to
+// s². It has the factor (1 − ε)^1.5 with ε = √N / s (Cooper, Mikic & Yovanovich 1969). With N = s² only the
+// first remains, which is that of the chain of links. All three are of tissue as stiff as the mean of the
+// faces' cells: other tissue near the node touches no anchor.
 float CompositeGrid::weight_of_faces(const AnchorFaces& faces, std::size_t n, float square) noexcept {
   const float count = faces.count[n];
   if (count == 0.0F) return 0.0F;

@@ -25,9 +25,9 @@ constexpr double kMaxForceError = 0.14;
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
 constexpr double kMaxThinShare = 0.02;  // of the stiffness of links at surfaces and where tissues meet
 
-// At surfaces and where tissues meet: share of the links' stiffness that belongs to tissue too thin to have a
-// cell of its own stiffness (LinkParts::thin). Coarse levels know cells only. Samples kRowsTried rows at
-// most.
+// Share of the links' stiffness that belongs to tissue only one voxel thick (LinkParts::thin), at surfaces
+// and where tissues meet. A cell is as stiff as the softest of its eight voxels, so such tissue has no cell
+// of its own stiffness. Coarse levels know cells only. Looks at kRowsTried rows at most.
 double thin_tissue_share(const Lattice& lattice) {
   constexpr RowId kRowsTried = 20000;
   const Grid& g = lattice.grid();
@@ -102,7 +102,7 @@ CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
 // Trials at places all over the surface: cycles must converge to rest, and a pressed voxel must feel the
 // force that it feels with patches twice as wide.
 CompositeGrid::Suitability CompositeGrid::try_contacts() {
-  constexpr std::size_t kPlaces = 12;
+  constexpr std::size_t kPlaces = 12;  // trials, at evenly numbered surface voxels
   CompositeGrid wide(lattice_, 2 * kTrialHalfWidth, 2 * kHalfWidth);
   const auto surface = lattice_.surface();
   // Differences between neighbours stay below every limit, so that limits play no part.
@@ -135,8 +135,9 @@ CompositeGrid::Suitability CompositeGrid::try_contacts() {
   return result;
 }
 
-// Do cycles without a tool come to rest fast enough? They start from a random state whose differences are at
-// most `most_m`.
+// Do cycles without a tool come to rest fast enough? They start from a random state in which neighbours
+// differ by at most `most_m`. The first kFirst of kCycles cycles do not count: smoothing removes most of the
+// random state at once.
 bool CompositeGrid::converges_at(const Index3& place, float most_m) noexcept {
   constexpr int kFirst = 3, kCycles = 10;
   begin(place);
@@ -159,8 +160,8 @@ bool CompositeGrid::converges_at(const Index3& place, float most_m) noexcept {
 
 // The steady force (N) on a voxel that is pushed along one axis from rest.
 double CompositeGrid::settled_press(const Index3& place, const glm::dvec3& push_m) noexcept {
-  constexpr int kRounds = 20, kCyclesOfRound = 10;
-  constexpr double kSettled = 1e-3;  // change in a round, as a share of the force
+  constexpr int kRounds = 20, kCyclesOfRound = 10;  // rounds at most, and cycles of each
+  constexpr double kSettled = 1e-3;                 // change in a round, as a share of the force
   std::array<bool, 3> axes{};
   axes[index(largest_axis(push_m))] = true;
   begin(place);

@@ -112,7 +112,7 @@ HYBRID_MULTIVERSIONED void restrict_row_by_links(const RestrictArgs& g) noexcept
   for (int o = 0; o < g.vectors; ++o) {
     const int at = o * kLanes;
     // Share of fine row n that the coarse row receives. The fine row before the coarse row (n = 0) lies
-    // between two coarse rows, and this one is the second.
+    // between two coarse rows, of which the coarse row is the second.
     const auto weight_of = [&](float whole, std::size_t n, const std::array<const float*, 2>& links,
                                Float8& w) __attribute__((always_inline)) {
       w = Float8{} + whole;

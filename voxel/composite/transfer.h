@@ -45,8 +45,8 @@ struct ProlongByLinksArgs {
 void prolong_row_by_links(const ProlongArgs& args, const ProlongByLinksArgs& by) noexcept;
 
 // Transposed operator interpolation onto one coarse row, from the fine row at its place and up to eight rows
-// around it. Index [z][y]: 0 before, 1 own, 2 after. A share of one half stands for a row between two coarse
-// rows; its links decide the actual share.
+// around it. Index [z][y]: 0 before, 1 own, 2 after. share_y, share_z: a share of one half marks a row that
+// lies between two coarse rows. The links of such a row decide which share of it this coarse row receives.
 struct RestrictArgs {
   std::array<std::array<const float*, 3>, 3> rows;  // null: no such row
   std::array<float, 3> share_y, share_z;

@@ -15,8 +15,12 @@ constexpr double kLeastRatio = 0.5;
 // for a held tool, but increases the error for a moving tool. The optimal momentum made tissue of ν 0.49
 // oscillate.
 constexpr double kBelowLimit = 0.6, kMostCarriedOn = 0.3;
+// Progress of the rounds, by their largest error of a load (end_round()). An error below kGain times the
+// least one so far is a gain. An error above kElsewhere times the least one shows that the tissue has moved,
+// and damping and search start again. In each round without gain after the first kPatience, step and momentum
+// are multiplied by kCalmer.
 constexpr float kGain = 0.98F, kElsewhere = 2.0F, kCalmer = 0.9F;
-constexpr int kPatience = 20;  // rounds
+constexpr int kPatience = 20;
 
 // A row and its eight neighbour rows, [z][y], each with one more voxel at both ends.
 constexpr std::size_t kStrideY = 40, kStrideZ = 3 * kStrideY, kOwn = kStrideZ + kStrideY + 1;
@@ -83,9 +87,10 @@ bool BrickLoads::begin_round() noexcept {
   return due_.count > 0;
 }
 
-// Damps the iteration while it makes no progress. With many links at their limits it does not converge: the
-// active set keeps changing, and the loads change with it. So step and momentum shrink after kPatience rounds
-// without progress, until the error grows by the factor kElsewhere.
+// Damps the iteration while it makes no progress. With many links at their limits it does not converge: other
+// links come to their limits in each round, and the loads change with them. A tool that was held still then
+// felt a force that wandered sideways. So step and momentum shrink after kPatience rounds without progress,
+// until the error grows by the factor kElsewhere.
 void BrickLoads::end_round() noexcept {
   left_N_ = worst_N_;
   if (left_N_ < kGain * least_left_N_) {

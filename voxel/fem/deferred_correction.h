@@ -85,6 +85,8 @@ class BrickLoads {
     LazyArray<RowId> row;
     std::size_t count = 0;
   };
+  // Bits of mark_. kMoved, kDue, kAgain: the row is in moved_, due_, retry_. kEver: it was ever in one of
+  // them. kChanged: its loads changed since take_changed(). kStepped: step_ of the row is not 0.
   static constexpr std::uint8_t kMoved = 1, kDue = 2, kAgain = 4, kEver = 8, kChanged = 16, kStepped = 32;
   using Materials = std::array<std::uint8_t, kRow + 2>;  // of a row, with one voxel beyond each end
 

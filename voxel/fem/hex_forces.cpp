@@ -10,8 +10,8 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kLanes = 8;
-constexpr std::size_t kSelf = 13;
+constexpr std::size_t kLanes = 8;  // voxels of a vector
+constexpr std::size_t kSelf = 13;  // number of the middle one of 3 × 3 × 3 nodes
 
 // Vector extension of GCC and Clang; equivalent loops over arrays are much slower.
 using NodeLanes [[gnu::vector_size(kLanes * sizeof(float))]] = float;

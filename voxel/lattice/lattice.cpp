@@ -15,7 +15,7 @@ namespace {
 // Ids between two entries of surface_before_: a compromise between memory and look-up time.
 constexpr std::size_t kSurfaceBlock = 256;
 constexpr std::size_t kGivenBack = std::size_t{1} << 24U;  // bytes of a volume returned at a time
-constexpr std::size_t kMostCells = std::size_t{1} << 31;
+constexpr std::size_t kMostCells = std::size_t{1} << 31;  // so that VoxelId, in 32 bits, can number all cells
 
 void check_material(std::size_t label, const LinkMaterial& m) {
   const auto say = [label](const std::string& what) {

@@ -209,8 +209,9 @@ class Lattice {
   // One byte a row. Low bits: number of voxels, or kInside if the row is full and inside a label (see
   // inside()). Top two bits: which of its voxels are anchored.
   enum class Anchors : std::uint8_t { none = 0, all = 1, some = 2 };
+  // kCount: mask of the six bits that count voxels. kInside: value of these bits in rows inside one label.
   static constexpr std::uint8_t kCount = 63, kInside = kRow + 1;
-  static constexpr int kAnchorShift = 6;
+  static constexpr int kAnchorShift = 6;         // position of the two bits of Anchors
   static constexpr std::size_t kListBlock = 64;  // rows per entry of listed_before_
   [[nodiscard]] Anchors anchors_of(RowId row) const { return Anchors(rows_[row] >> kAnchorShift); }
   // Anchored lanes of a row with Anchors::some.

@@ -13,7 +13,7 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kPagesAtOnce = 4096;
+constexpr std::size_t kPagesAtOnce = 4096;  // entries of the page map that are read at once
 
 std::size_t page_bytes() {
   static const auto bytes = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
@@ -27,6 +27,7 @@ class PageMap {
   // mincore() is unsuitable: it counts pages that were only read and omits pages that are swapped out, so
   // copies would lose the contents of swapped pages.
   using Entries = std::array<std::uint64_t, kPagesAtOnce>;
+  // bits of an entry of /proc/self/pagemap
   static constexpr std::uint64_t kPresent = 1ULL << 63U, kSwapped = 1ULL << 62U, kMappedOnce = 1ULL << 56U;
 
   PageMap() : file_(::open("/proc/self/pagemap", O_RDONLY | O_CLOEXEC)) {}

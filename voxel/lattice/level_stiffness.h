@@ -168,6 +168,7 @@ class LevelStiffness {
   // 0. The other down-links are stored with their own rows, and Cells apart, so that a cycle reads less
   // memory.
   struct alignas(64) Written {
+    // floats before the first value; the last of them is the link down along x
     static constexpr std::size_t kBefore = 8;
     std::array<float, kBefore + std::size_t{3} * kRow> along, across;
     std::array<Lanes, 3> inverse;

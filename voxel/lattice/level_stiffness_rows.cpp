@@ -17,7 +17,7 @@ namespace {
 template <class T>
 void add_to_hash(std::uint64_t& hash, const T& what) {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint64_t) == 0);
-  constexpr std::uint64_t kPrime = 0x100000001b3;
+  constexpr std::uint64_t kPrime = 0x100000001b3;  // of the 64-bit FNV hash
   const auto* at = reinterpret_cast<const char*>(&what);
   for (std::size_t n = 0; n < sizeof(T); n += sizeof(std::uint64_t)) {
     std::uint64_t word = 0;

@@ -49,7 +49,7 @@ inline constexpr std::size_t kLinkItself = 4;
 // Parallels of the link of a voxel in direction +d. Bit (x+1) + 3(y+1) + 9(z+1) of `filled` is set if the
 // voxel at offset (x, y, z) exists; x, y and z are −1, 0 or 1.
 [[nodiscard]] constexpr std::uint32_t parallel_links(std::uint32_t filled, int d) {
-  constexpr std::array<int, 3> kStep{1, 3, 9};
+  constexpr std::array<int, 3> kStep{1, 3, 9};  // from a bit of `filled` to the next one along x, y, z
   const int along = kStep[static_cast<std::size_t>(d)];
   const int across_p = kStep[static_cast<std::size_t>((d + 1) % 3)],
             across_q = kStep[static_cast<std::size_t>((d + 2) % 3)];

@@ -180,10 +180,11 @@ glm::dvec3 no_deeper(const Obstacle& o, const glm::dvec3& before, const glm::dve
 
 namespace {
 
-// Place of least energy within the intervals low … high and outside the obstacle. `wanted` is the minimum
-// without either; w is the compliance. The obstacle's multiplier grows from 0 until the place is outside.
-// Meanwhile each axis moves at the rate w·n as long as it lies in its interval. A projection that is clamped
-// afterwards would be wrong: an axis at its limit would not be compensated by the other axes.
+// Place of least energy within the intervals low … high and outside the obstacle (m). `wanted` is the place
+// of least energy without obstacle and intervals. `w` is the compliance (m/N). The force of the obstacle is
+// raised from 0 until the place is outside. A force of 1 N moves each axis by w·n, as long as the axis lies
+// in its interval. To project first and clamp afterwards would be wrong: the other axes would not move
+// further for an axis that is stopped at the end of its interval.
 glm::dvec3 least_outside(const Obstacle& o, const glm::dvec3& w, const glm::dvec3& wanted,
                          const glm::dvec3& low, const glm::dvec3& high) noexcept {
   const glm::dvec3 n(o.normal), rate = w * n;

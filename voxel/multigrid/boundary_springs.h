@@ -2,11 +2,12 @@
 // Boundary springs: the stiffness that fixed voxels (anchors, tool contacts, and obstacle contacts along
 // their normal) add to each coarse cell.
 //
-// A link from a free voxel to a fixed one is a spring between the free voxel's cell and the fixed place. On
+// A link from a free voxel to a fixed one is a spring between the free voxel's cell and the fixed voxel. On
 // the next coarser level this spring is in series with half a link of that level, because the middle of the
-// coarser cell is that much further away. So a fixed plane stays where it is on every level, and a single
-// fixed voxel holds a large cell by about the stiffness of one voxel in an infinite lattice (3.96 of its
-// links; Cserti, Am. J. Phys. 68, 2000). Each axis, and links in each direction, are treated independently.
+// coarser cell is that much further away. This has two consequences. A plane of fixed voxels is at the same
+// place on every level. A single fixed voxel holds a large cell with about the stiffness of one voxel in an
+// infinite lattice (3.96 times that of one of its links; Cserti, Am. J. Phys. 68, 2000). Each axis, and links
+// in each direction, are treated independently.
 #pragma once
 
 #include <array>
@@ -32,7 +33,7 @@ class BoundarySprings {
     bool operator==(const Support&) const = default;
     [[nodiscard]] bool slides() const { return by == By::obstacle || by == By::tool; }
   };
-  static constexpr int kUnit = 127;
+  static constexpr int kUnit = 127;  // length of Support::n
   [[nodiscard]] static Support along(const glm::vec3& normal, Support::By what) noexcept;
   static constexpr Support kAll{Support::By::all, {}};
 
@@ -58,8 +59,8 @@ class BoundarySprings {
   [[nodiscard]] const float* hold(int level, RowId row, std::size_t axis) const {
     return at(level).hold[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
-  // [lane] A cell takes the part 1 / (1 + nearer) of a prolonged correction, because it is nearer to the
-  // fixed place than the middle of the coarser cell is.
+  // [lane] A cell takes the share 1 / (1 + nearer) of a correction that is prolonged to it. The share is less
+  // than 1, because the cell is nearer to the fixed voxel than the middle of the coarser cell is.
   [[nodiscard]] const float* nearer(int level, RowId row, std::size_t axis) const {
     return at(level).nearer[axis].data() + static_cast<std::size_t>(row) * kRow;
   }
@@ -77,9 +78,10 @@ class BoundarySprings {
 
  private:
   using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links along d (N/m)
-  // Springs of anchors are found when their row is first asked for, because all of them would take much
-  // memory. On coarse levels finding them takes long: there they are found on construction and stored as
-  // records, without zeros.
+  // The springs that anchors add to one cell, without zeros. On levels finer than LevelStiffness::kKept,
+  // springs of anchors are found when their row is first read, because the springs of all rows would take
+  // much memory. From level kKept on it would take long to find those of a row. So there they are found on
+  // construction, and each cell with such springs has a record.
   struct Record {
     VoxelId cell;
     std::uint32_t first;  // index of its first value in Level::values
@@ -95,11 +97,12 @@ class BoundarySprings {
     LazyArray<std::uint8_t> row_tilted;  // [row] number of cells with an off-diagonal stiffness
     LazyArray<std::uint8_t> queued;      // [cell] 1: it is queued
     LazyArray<std::uint32_t> found;      // [row] lanes of a waiting row whose springs are stored
-    // Springs of the cells near anchors, sorted by cell; on levels from LevelStiffness::kKept on.
+    // The records of this level, in the order of their cells; empty on levels finer than
+    // LevelStiffness::kKept. `values` has the stiffnesses of all records, one record after another (N/m).
     std::vector<Record> records;
     std::vector<float> values;
   };
-  static constexpr std::uint8_t kWaits = 0x80;
+  static constexpr std::uint8_t kWaits = 0x80;  // bit of row_held: springs of anchors are not stored yet
 
   struct Found {  // springs of one cell; members as in Level
     Through through{};

@@ -45,8 +45,9 @@ glm::vec3 normal_of(const BoundarySprings::Support& by) {
   return glm::vec3(by.n[0], by.n[1], by.n[2]) * unit;
 }
 
-// Stiffness along n of springs k (N/m) whose other end moves freely across n: 1 / (nᵀ k⁻¹ n), the Schur
-// complement of the free motion. For contacts with the tool only; beside obstacles √k n nᵀ √k is used.
+// Stiffness along n of springs k (N/m, one per axis) if their end moves freely across n: 1 / (nᵀ k⁻¹ n), the
+// Schur complement of the free motion. It is used for contacts with the tool. Beside obstacles √k n nᵀ √k is
+// used instead.
 float spring_along(const glm::vec3& n, const std::array<float, 3>& k) {
   float compliance = 0.0F;
   for (int axis = 0; axis < 3; ++axis) {

@@ -20,6 +20,7 @@ constexpr int kObstacleRounds = 3;
 // Bit i is set if lane i of a row is near a rigid surface. Eight lanes are tested at a time, because few of
 // them are near one.
 std::uint32_t obstacle_lanes(const Displacement& state, RowId row) {
+  // the lowest bit of each byte; the seven lowest bits of each byte
   constexpr std::uint64_t kOnes = 0x0101010101010101U, kLow = 0x7F * kOnes;
   static_assert(std::endian::native == std::endian::little);
   std::uint32_t lanes = 0;
@@ -119,9 +120,10 @@ float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state
   return std::max(change, slide_pressed(row, state, span));
 }
 
-// Corrects a row of voxels as far as links and obstacles allow. The part that an obstacle refuses is not
-// subtracted from the cells, because the voxel slides along the obstacle with its neighbours. If cells lost
-// that part in every cycle, they would oscillate between two states.
+// Corrects a row of voxels as far as links and obstacles allow. An obstacle may refuse a part of the
+// correction. Unlike a part refused by links, it is not subtracted from the cells above: the voxel slides
+// along the obstacle with its neighbours, and cells that lose that part in every cycle oscillate between two
+// states.
 RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
                                         Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                         RowVector& refused) noexcept {
@@ -173,9 +175,9 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
   }
 }
 
-// Motion from another solver takes no voxel deeper into its obstacle than it was, except by rounding. If
-// rounding counted as an overlap, the voxel would be projected again, beside neighbours that have not moved
-// yet. Then the two solvers would disagree more with each exchange.
+// Adds motion of another solver. It takes no voxel deeper into its obstacle than it was, except by rounding.
+// Rounding must not count as an overlap: the voxel would be projected out again while its neighbours have not
+// moved yet, and the two solvers would differ more with each exchange.
 void Multigrid::add_motion(RowId row, const RowVector& way, Displacement& state,
                            const ObstacleView& obstacles) noexcept {
   if (!prepare(0, row)) return;

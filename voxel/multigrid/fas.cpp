@@ -11,15 +11,15 @@
 namespace voxel {
 namespace {
 
-constexpr int kMaxLevels = 10;
-constexpr int kSmallest = 3;  // greatest number of cells along an axis of the coarsest level
+constexpr int kMaxLevels = 10;  // levels of the hierarchy, at most
+constexpr int kSmallest = 3;    // greatest number of cells along an axis of the coarsest level
 // The springs of this level and of coarser ones are found on construction.
 constexpr int kWrittenAtOnce = 5;
 // Greatest number of rows with a frozen residual. The contact of a tool has some hundred.
 constexpr std::size_t kMaxFrozen = 4096;
 // Greatest number of rows that a tick adds in one batch.
 constexpr std::size_t kMostInTick = 1024;
-constexpr std::uint8_t kAllAxes = 7;
+constexpr std::uint8_t kAllAxes = 7;  // the bits of all three axes
 // Greatest number of active limits, summed over all levels. Voxels and cells beyond that number still move.
 constexpr std::size_t kMaxStopped = 65536;
 
@@ -114,9 +114,9 @@ void Multigrid::spread(int level, RowId row, std::uint8_t flags) noexcept {
   if (level == 0 && (flags & active) != 0) tiles_.mark_dirty(g.row_coordinates(row));
 }
 
-// Notes that a row moved by `change` (m). A change too small for a sweep is still restricted, because small
-// forces on many voxels add up to a large one on the cell above. From each level to the next this force grows
-// by a factor of four.
+// Notes that a row moved by `change` (m). Even a change too small to need a sweep is restricted, because
+// small forces on many voxels add up to a large force on the cells above: four times as much on each coarser
+// level.
 void Multigrid::note_change(int level, RowId row, float change) noexcept {
   if (change <= restricted_m()) return;
   if (level == 0) bricks_.look_at(row);

@@ -5,6 +5,11 @@
 // a coarse cell holds a displacement, not a correction. So a tick can solve the neighbourhood of the contact
 // on all levels. Further away it moves only the coarse cells, and later ticks prolong their corrections to
 // the voxels. A correction that is not prolonged yet is *pending*.
+//
+// Terms: a coarse cell stands for 2 × 2 × 2 cells of the finer level, its *children*; it is the cell *above*
+// them. A *Float8* is a vector of 8 neighbouring values of a row. An *active limit* holds a voxel or cell on
+// one axis: a link is at its limit, and the net force pushes against that limit. The held voxel or cell does
+// not move on that axis until the limit is *released*.
 #pragma once
 
 #include <array>
@@ -126,9 +131,10 @@ class Multigrid {
   float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
                        LaneSpan span = {}) noexcept;
   // Prolongs pending corrections of coarse rows marked `source` to the rows of a box (see prolongation.h),
-  // plane by plane. The part of a correction that links at their limits refuse is subtracted from the cells
-  // again. Otherwise cells would pull at their neighbours more and more. `jointly`: all voxels move together
-  // (limited_correction.h). This is for tissue that has far to go and whose rows would block one another.
+  // plane by plane. Links at their limits may refuse a part of a correction. This part is subtracted from the
+  // cells again, because otherwise these cells would pull at their neighbours more in every cycle. `jointly`:
+  // all voxels move together (limited_correction.h). This is for tissue that has far to go and whose rows
+  // would block one another.
   struct ProlongedBox {
     int q0, q1, j0, j1, k0, k1;     // Float8 and rows of the level, inclusive
     int first_source, last_source;  // cells of the next coarser level along x that prolong
@@ -190,10 +196,10 @@ class Multigrid {
   // Moves the blocks that meet a box of a level to the equilibrium of their border's springs.
   void smooth_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                      const ObstacleView& obstacles) noexcept;
-  // measure_blocks() finds the residuals of the blocks; call it before the coarser level's loads are
-  // restricted. load_blocks() finds the blocks' own loads on the coarser level; call it afterwards. For level
-  // 0, measure_blocks() returns the largest residual of a block, divided by the square root of its number of
-  // border links (N).
+  // measure_blocks() finds the residuals of the blocks on `level`; call it before loads are restricted to the
+  // coarser level. load_blocks() then finds the blocks' own loads on the coarser level; call it after that
+  // restriction. For level 0, measure_blocks() returns the largest residual of a block, divided by the square
+  // root of the block's number of border links (N).
   float measure_blocks(int level, const RigidBlocks::Box& box, Displacement& state,
                        const ObstacleView& obstacles) noexcept;
   void load_blocks(int level, const RigidBlocks::Box& box) noexcept;
@@ -303,7 +309,7 @@ class Multigrid {
     std::uint8_t stopped = 0;      // bits: axes on which a limit holds it
     glm::dvec3 frozen_N{0.0};      // load that freezes its residual
   };
-  static constexpr std::size_t kMaxBlockBounds = 1024;
+  static constexpr std::size_t kMaxBlockBounds = 1024;  // bounds of one block, at most
 
   [[nodiscard]] Level& at(int level) { return levels_[static_cast<std::size_t>(level)]; }
   [[nodiscard]] const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }

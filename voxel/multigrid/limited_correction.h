@@ -4,10 +4,10 @@
 //
 // If rows moved one after another, links to rows that have not moved yet would stop them, and voxels that
 // active limits tie together would not move. So all rows move first. Then voxels with a link beyond its limit
-// come back towards their start until no link is violated. At the start no link was violated. So one end of a
-// violated link can always come nearer to its start, and no voxel has to move away from its start on the way
-// back. States that satisfy difference constraints are closed under minimum and maximum. So if all voxels on
-// an axis move the same way, they come back by the least amount, whatever the order.
+// come back towards their start until no link exceeds its limits. This always succeeds: at the start no link
+// exceeded its limits, so one end of such a link can come nearer to its start. If all voxels move in the same
+// direction on an axis, they come back by the least amount, whatever the order. (The reason is that the
+// minimum and the maximum of two states within such limits are within them, too.)
 #pragma once
 
 #include <algorithm>

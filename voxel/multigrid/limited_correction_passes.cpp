@@ -16,9 +16,9 @@ constexpr std::size_t kMostVisits = 64;
 }  // namespace
 
 // Moves a row by the motion in `from`. Held and anchored voxels stay. Pressed voxels move along the tool's
-// tangent plane. A voxel that an active limit holds does not move, but its target is stored. If a limit cuts
-// one axis of a sliding voxel's motion, the voxel leaves the tool or enters it by a little, until the next
-// projection.
+// tangent plane. A voxel that an active limit holds does not move, but its target is stored. A limit may cut
+// the motion of a sliding voxel on one axis. Then the voxel leaves the tool or enters it by a little, until
+// it is projected again.
 void Multigrid::set_out(LimitedCorrection::Row& r, Displacement& state) noexcept {
   LevelRow row = row_of(0, r.row, state);
   const std::size_t begin = static_cast<std::size_t>(r.row) * kRow;

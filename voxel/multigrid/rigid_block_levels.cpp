@@ -14,9 +14,10 @@
 
 namespace voxel {
 
-// Sets the residual that is restricted from the cells of blocks in a row. It is 0 for a block that the
-// coarser level knows, because that level gets the block's residual as a whole. It is 0 for a block that
-// sprawls. For other blocks it is an equal share for each cell.
+// Sets the residual that is restricted from the cells of blocks in a row (rigid_blocks.h explains when a
+// level knows a block, and when a block sprawls). It is 0 for a block that the coarser level knows, because
+// that level gets the block's residual as a whole. It is 0 for a block that sprawls. The residual of any
+// other block is divided equally among its cells.
 void Multigrid::set_block_lanes(int level, RowId row, LaneSpan span, RowVector& out) const noexcept {
   for (int i = span.first * kLanes; i < (span.last + 1) * kLanes; ++i) {
     const std::uint16_t number = blocks_->of(level, row * kRow + static_cast<VoxelId>(i));

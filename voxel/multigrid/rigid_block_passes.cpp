@@ -89,7 +89,7 @@ glm::dvec3 Multigrid::block_force(std::size_t block, const Displacement& state) 
 // link.
 template <class Room>
 Multigrid::AdmissibleInterval Multigrid::room_on_border(std::size_t block, const Room& room) const noexcept {
-  constexpr double kUnlimited = 1e30;
+  constexpr double kUnlimited = 1e30;  // (m)
   AdmissibleInterval all{{{-kUnlimited, kUnlimited}, {-kUnlimited, kUnlimited}, {-kUnlimited, kUnlimited}}};
   for (const RigidBlocks::Link& l : blocks_->on(0, block).border) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -348,8 +348,8 @@ float Multigrid::measure_blocks(int level, const RigidBlocks::Box& box, Displace
     on.active = true;
     block.on[static_cast<std::size_t>(level) + 1].passed = on.left;
     if (level > 0 || of.border.empty()) return;
-    // The residual is measured per border link, because the force of each link may be off by the tolerance.
-    // The rounding of the displacement is subtracted.
+    // The force of each border link may be off by the tolerance, so the residual is divided by the square
+    // root of their number. The rounding of the displacement is subtracted first.
     const glm::dvec3 bit = kRounding * glm::abs(state.at(of.border.front().cell)) * stiffness;
     const double left = std::max(0.0, glm::length(on.left) - glm::length(bit));
     worst = std::max(worst, static_cast<float>(left / std::sqrt(static_cast<double>(of.border.size()))));

@@ -10,7 +10,7 @@
 namespace voxel {
 namespace {
 
-constexpr int kMostRounds = 200;
+constexpr int kMostRounds = 200;   // rounds of coordinate ascent in move_within()
 constexpr double kSettled = 1e-9;  // (unit: largest force of a bound) a smaller change ends the ascent
 // A level knows a block if at least this share of the block's voxels lies in cells in which the block has at
 // least half of the voxels. With a smaller share, the force of the whole block would act on the springs of a

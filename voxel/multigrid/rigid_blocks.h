@@ -33,11 +33,12 @@ struct BlockBound {
   glm::dvec3 normal{0.0};
   double room_m = 0.0;
   bool both = false;
-  double force_N = 0.0;  // multiplier, along the normal
+  double force_N = 0.0;  // force of the bound on the block along the normal (its multiplier)
 };
-// Motion of a body under `force_N` on springs of this stiffness, within bounds. Sets the bounds' multipliers,
-// starting from those given. Coordinate ascent of the dual (Hildreth); a few rounds suffice for three
-// unknowns.
+// Returns the motion (m) of a body that `force_N` pulls against springs of this stiffness, within `bounds`.
+// On entry, BlockBound::force_N is a first guess of each bound's force; on return it is that force. The
+// forces are found by coordinate ascent of the dual problem (Hildreth). The body has three unknowns, so a few
+// rounds suffice.
 glm::dvec3 move_within(const glm::dvec3& force_N, const glm::dvec3& stiffness_N_per_m,
                        std::span<BlockBound> bounds) noexcept;
 
@@ -119,8 +120,9 @@ class RigidBlocks {
   struct Level {
     std::vector<OnLevel> blocks;
     LazyArray<std::uint16_t> number;  // [cell]; empty on level 0
-    std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled: has no other cells
+    std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled, kFilledKnown; 0: has none
   };
+  // kFilled: the row has cells of blocks only. kFilledKnown: and the next coarser level knows all of them.
   static constexpr std::uint8_t kFilled = 2, kFilledKnown = 3;
   // A cell, and how many voxels of one block it holds.
   struct Share {

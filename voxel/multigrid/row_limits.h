@@ -94,13 +94,13 @@ HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& 
   take_least(wanted, in.high);
   wanted = in.low > in.high ? now : wanted;
 }
-// [d] The limits of a link need no check if its difference is smaller in size than this: a little less than
-// the tightest limit of the row.
+// [d] A link along d needs no check against its own limits if the difference of its ends is smaller in size
+// than this (m). It is a little less than the tightest limit in the row.
 struct Band {
   std::array<float, 3> most;
 
   explicit Band(const AxisLimits& l, float tight = 0.0F) {
-    constexpr float kNear = 0.999F;
+    constexpr float kNear = 0.999F;  // of the limit; allows for rounding
     for (std::size_t d = 0; d < 3; ++d) {
       const float least = std::min(l.high[d], -l.low[d]);
       most[d] = std::min(kNear * least, least - tight);
@@ -168,7 +168,7 @@ HYBRID_INLINE void look_beyond(Mask8& beyond, const Float8& own, const Float8& x
 HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Float8& x_down,
                                      const Float8& x_up, const LevelRow& row, const RowLimits::Written& w,
                                      std::size_t axis, int group) {
-  constexpr float kNear = 0.999F;
+  constexpr float kNear = 0.999F;  // of the limit; allows for rounding
   const float* at = row.u[axis] + group * kLanes;
   const auto lanes = static_cast<std::size_t>(group) * kLanes;
   for (std::size_t d = 0; d < 3; ++d) {

@@ -25,7 +25,8 @@ struct LevelRow {
   // [lane] bit `axis`: an active limit holds it on that axis; null: none
   const std::uint8_t* stopped = nullptr;
   // [axis] Boundary springs; all null if there are none. `hold`: their stiffness divided by that of all links
-  // of the cell, to be multiplied by hold_times. `held_at`: the place that they pull to.
+  // of the cell; it still has to be multiplied by hold_times. `held_at`: the displacement towards which they
+  // pull (m).
   std::array<const float*, 3> hold{};
   std::array<const float*, 3> held_at{};
   float hold_times = 1.0F;
@@ -95,7 +96,7 @@ float row_way(const float* now, const float* was, float* way) noexcept;
 // of a mask are lanes.
 struct LinksAtLimits {
   // [d] lanes whose link up along d has its difference at the lower limit (at_low) or at the upper limit
-  // (at_high); down_…: likewise the link down
+  // (at_high). down_at_low, down_at_high: lanes whose link down along d is at its lower or upper limit.
   std::array<std::uint32_t, 3> at_low, at_high, down_at_low, down_at_high;
   std::uint32_t pulled_up, pulled_down;
   std::uint32_t movable;  // not anchored

@@ -29,7 +29,7 @@ HYBRID_INLINE void spring(Float8& k, const float* lanes, int group) {
   load(k, kUniform ? lanes : lanes + group * kLanes);
 }
 
-inline constexpr Mask8 kEven{-1, 0, -1, 0, -1, 0, -1, 0};
+inline constexpr Mask8 kEven{-1, 0, -1, 0, -1, 0, -1, 0};  // selects the even lanes
 
 // The Float8 of a span, and one more at both ends, of which only the lane next to the span is valid.
 struct Span {

@@ -79,7 +79,7 @@ HYBRID_MULTIVERSIONED_512 void take_loads(const LevelRow& row, const RowVector& 
 HYBRID_MULTIVERSIONED_512 void take_pending_correction(const float* value, float* prolonged,
                                                        const float* filled, LaneSpan span, int first,
                                                        int last, float* out) noexcept {
-  constexpr Mask8 kLane{0, 1, 2, 3, 4, 5, 6, 7};
+  constexpr Mask8 kLane{0, 1, 2, 3, 4, 5, 6, 7};  // number of each lane
 #pragma GCC unroll 1
   for (int group = span.first; group <= span.last; ++group) {
     const int lane = group * kLanes;
@@ -126,6 +126,7 @@ HYBRID_MULTIVERSIONED_512 bool all_ones(const float* lanes, int groups) noexcept
 
 HYBRID_MULTIVERSIONED_512 void sum_interpolated(const std::array<ProlongedRow, 4>& rows, LaneSpan span,
                                                 RowVector& out) noexcept {
+  // Trilinear weights: (3/4)², 3/4 · 1/4, 1/4 · 3/4, (1/4)². The rows hold their interpolation along x.
   static constexpr std::array<float, 4> kShare{0.5625F, 0.1875F, 0.1875F, 0.0625F};
   bool whole = true;
   for (const ProlongedRow& r : rows) whole = whole && r.weight == nullptr;
@@ -180,7 +181,7 @@ HYBRID_MULTIVERSIONED_512 void take_back(const RowVector& sums, const float* sha
 
 HYBRID_MULTIVERSIONED_512 float row_difference(const float* a, const float* b, LaneSpan span, int first,
                                                int last) noexcept {
-  constexpr Mask8 kLane{0, 1, 2, 3, 4, 5, 6, 7};
+  constexpr Mask8 kLane{0, 1, 2, 3, 4, 5, 6, 7};  // number of each lane
   Float8 most{}, x, y;
 #pragma GCC unroll 1
   for (int group = span.first; group <= span.last; ++group) {

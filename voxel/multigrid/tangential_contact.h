@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Frictionless sliding of pressed voxels on the tool, as a part of relaxation.
 //
-// During a cycle the tool is its tangent plane at each pressed voxel. The voxel keeps its displacement along
-// the normal and relaxes in the plane, on every level. If it were fixed on all axes, cycles would not reduce
-// the error of the contact itself.
+// During a cycle, the tool's surface is replaced by its tangent plane at each pressed voxel. The voxel keeps
+// its displacement along the normal and relaxes in the plane, on every level. If it were fixed on all axes,
+// cycles would not reduce the error of the contact itself.
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -24,8 +24,9 @@ constexpr double kSettled = 2e-3;
 constexpr double kContraction = 0.5;
 // Contact cycles a tick, at most.
 constexpr int kMostCycles = 2;
-// In spacings. With a large patch a tick has one cycle only, because a second one gains little and exceeds
-// the time of a tick. A second cycle runs if the contact is still further than this from equilibrium.
+// Distance of the contact from equilibrium (unit: spacing). Beyond it, a second contact cycle runs in a tick.
+// A cycle that is split over ticks is an exception, because a second one gains little and exceeds the time of
+// a tick.
 constexpr double kJump = 0.1;
 // Counted work (Float8 prolonged) that a tick may spend on split cycles under asynchronous relaxation. A
 // cycle that is not finished continues in the next tick. If a cycle ends and at least kLeastWork is left of
@@ -82,8 +83,8 @@ bool SoftObject::contact_is_still() const noexcept {
 bool SoftObject::cycle_due() const noexcept {
   if (relaxation_.under_way()) return cycles_since_touch_ == 0 && !(skips_cycle_ && any_pressed());
   const double to_go = unsettled_m_ / lattice_->min_spacing_m();
-  // A contact that is nearly at rest is left to the background, which relaxes the whole object. A contact
-  // cycle holds the surroundings of its box fixed.
+  // A contact that is nearly at rest is left to the background relaxation, which relaxes the whole object. A
+  // contact cycle could not bring it to rest, because it keeps the surroundings of its box fixed.
   if (to_go < kSettled || cycles_since_touch_ == kMostCycles) return false;
   const bool apart = relaxation_.left_to_shadow(), in_parts = apart && split_cycle_;
   if (to_go >= kJump && !in_parts && !skips_cycle_) return true;
@@ -132,9 +133,9 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
                                                in_parts ? left : Relaxation::kUnlimited);
     split_cycle_ = relaxation_.has_large_patch();
   }
-  // All touches are projected once more at the end, so that the reaction is measured with all voxels at their
-  // projections. Pressed voxels come first: a dependent counts only if its link to a pressed voxel is at its
-  // limit when the reaction is measured.
+  // At the end all touched voxels are projected out of the tool once more, because the reaction is measured
+  // in that state. Pressed voxels are projected first: a dependent counts only if its link to a pressed voxel
+  // is at its limit when the reaction is measured.
   for (const bool pressed : {true, false}) {
     for (Touch& t : touches_) {
       if (t.pressed == pressed) relax_touch(tool, t);
@@ -146,9 +147,9 @@ void SoftObject::relax_near(const ToolInBody& tool, int cycles) noexcept {
   move_followers();
 }
 
-// The pair solver projects its voxels with all others fixed. If chains are at their limits in both objects,
-// this lifts the tool, and the tool comes back in the next tick. Contact cycles around these voxels end such
-// limit cycles; results of the shadow come too rarely.
+// The solver of contacts between soft objects projects the voxels of a pair while all other voxels stay. If
+// chains are at their limits in both objects, this lifts the tool, and the tool comes back in the next tick.
+// Contact cycles around these voxels end this oscillation. Results of the shadow come too rarely to end it.
 void SoftObject::relax_near_pairs() noexcept {
   if (touches_.empty()) {  // touch() was not called
     contact_work_ = 0;

@@ -19,7 +19,8 @@ namespace voxel {
 
 class ContactEnergy {
  public:
-  // A contact begins: the energy that it stores in the first account() counts as given.
+  // Call it when a contact begins. At the next account() the contact counts as given exactly the energy that
+  // it then stores, a third of force times depth. From then on work of the tool is added.
   void begin() noexcept { *this = {}; }
   // Once a tick: the tool moved by `way_m`; force_N is the tissue's force on it before scaling, at depth
   // `depth_m`.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Loads that pass through links at their limits: dependents of pressed voxels follow them, are felt through
-// them, and hold them.
+// Loads that pass through links at their limits. Dependents are voxels that such links tie to a pressed
+// voxel. They move with the pressed voxel when it withdraws, and their loads are part of the force on the
+// tool.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -115,8 +116,10 @@ void SoftObject::gather(VoxelId v, std::uint32_t touch) noexcept {
   gathered_.push_back({v, touch});
 }
 
-// A dependent that pulls a pressed voxel back is felt through it: its load is the multiplier of the chain's
-// limit. Without this load the force would saturate as soon as the chain is at its limits.
+// Returns the sum of the loads of all dependents (N), and adds their stiffness. A dependent pulls a pressed
+// voxel back through links at their limits, and the displacement of such a link does not show how much. So
+// the dependents' own loads are summed. Without them the force would saturate as soon as the chain is at its
+// limits.
 glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
   glm::dvec3 force(0.0);
   gathered_.clear();
@@ -326,9 +329,10 @@ void SoftObject::find_pair_dependents() noexcept {
     forget_pair_dependents();
 }
 
-// If a link at its limit carries a source's load, the multiplier is assigned to the voxel at the link's other
-// end, provided that pairs press that voxel harder. Near the hardest contact, pairs often press less than
-// links pull. Without this assignment their loads would be lost.
+// pair_sources_ are the voxels that pairs press, the hardest pressed first. If a link at its limit carries
+// the load of one source to a source that is pressed harder, the load is added to that one. Near the hardest
+// contact, pairs often press a voxel less than its links pull it. Without this step the load of such a voxel
+// would be lost.
 void SoftObject::reassign_multiplier(int axis) noexcept {
   const auto& u = state_.u[static_cast<std::size_t>(axis)];
   for (std::size_t i = pair_sources_.size(); i-- > 1;) {

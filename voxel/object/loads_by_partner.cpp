@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A link at its limit passes a load that its displacement does not show. But such a link pulls its two ends
-// with opposite forces. A cluster is all voxels that such links tie together. In the sum over a cluster these
-// forces cancel. The sum of all other loads is the load on the partners of the cluster. Links couple no axes
-// at their limits, so each axis has clusters of its own.
+// A link at its limit passes on a load that the displacements do not show. But it pulls its two ends with
+// opposite forces. A *cluster* consists of all voxels that links at their limits tie together. In the sum of
+// the loads of a cluster the forces of these links cancel, and the rest is the load that the partners of the
+// cluster carry. Limits act on each axis separately, so each axis has its own clusters.
 #include "voxel/object/loads_by_partner.h"
 
 #include <algorithm>

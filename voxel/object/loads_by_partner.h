@@ -15,7 +15,7 @@ namespace voxel {
 
 // A partner is the hand, the anchors, or one rigid object (from number 2 on).
 inline constexpr std::uint32_t kHandPartner = 0, kAnchorPartner = 1, kFirstRigidPartner = 2;
-inline constexpr std::size_t kMostPartners = 64;
+inline constexpr std::size_t kMostPartners = 64;  // bits of a set of partners
 
 // A voxel that a partner holds against the pull of the voxel's links.
 struct HeldVoxel {
@@ -34,12 +34,12 @@ struct PartnerLoad {
 // Appends the anchored voxels that other tissue of the object may pull.
 void list_anchors(const SoftObject& object, std::vector<HeldVoxel>& held);
 
-// The force of each of the `partners` partners on the object in its present state. The entry of the hand
-// stays 0. The forces include springs, bricks and the loads of other soft objects (SoftObject::pair_load),
+// Returns the force of each of the `partners` partners on the object in its present state. The entry of the
+// hand stays 0. The forces balance those of springs, bricks and other soft objects (SoftObject::pair_load),
 // and the loads that links at their limits pass on to `held`. `hand_N` is the force of the hand on the
-// object: it serves to divide the load of voxels that links at their limits tie both to the hand and to one
-// other partner. A voxel may be in `held` once for each of its partners. Allocates; reads the state only. Not
-// for an object on nested patches or with rigid blocks.
+// object. It is needed where links at their limits tie voxels both to the hand and to one other partner: that
+// partner carries the rest of their load. A voxel may be in `held` once for each of its partners. Allocates;
+// reads the state only. Not for an object on nested patches or with rigid blocks.
 [[nodiscard]] std::vector<PartnerLoad> loads_by_partner(const SoftObject& object,
                                                         std::span<const HeldVoxel> held, std::size_t partners,
                                                         const glm::dvec3& hand_N);

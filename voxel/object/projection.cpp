@@ -49,8 +49,9 @@ double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const gl
 
 }  // namespace
 
-// Finds the least energy of the springs on the tool's surface, so sliding on the tool has no friction. This
-// is a projection in the metric of the springs, with the surface linearised at the last place.
+// Finds the place of least spring energy on the tool's surface. The energy alone decides where on the surface
+// the voxel lies, so it slides on the tool without friction. This is a projection in the metric of the
+// springs. In each step the surface is replaced by its tangent plane at the last place.
 glm::dvec3 SoftObject::project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                        const glm::dvec3& wished, const glm::dvec3& compliance,
                                        Gap& g) const noexcept {
@@ -118,8 +119,9 @@ glm::dvec3 SoftObject::project_voxel(const ToolInBody& tool, const VoxelLinks& l
   }
   if (obstacles_.empty()) {
     const glm::dvec3 place = clamp_to_links(links, wanted, now);
-    // Beside other soft objects the pair solver has the last word. If anchors keep a voxel in the tool, the
-    // tool has to give way: it must not part tissue like a wedge.
+    // The voxel is moved out of the tool within its limits, with two exceptions. Beside another soft object
+    // the solver of pairs moves it later. If anchors keep the voxel in the tool, the tool gives way instead,
+    // because it must not push tissue apart as a wedge would.
     const bool let_out = t.pressed && place != wanted && claimed_voxels_.empty() &&
                          !(anchors_pull_ && gap(tool, rest + now).distance < -kGiveWay * voxel_radius());
     return let_out ? project_on_tool_within_limits(tool, links, wished, t) : place;

@@ -13,15 +13,15 @@ namespace {
 
 // Rows near the contact that a tick applies at once, at most. If a contact has more rows, steps are felt.
 constexpr std::size_t kMaxAtOnce = 1000;
-// A whole cycle reduces the error at the contact only a little. So kContactCycles contact cycles follow it in
-// the next kUnsettled results after the tool moved by more than kMoved spacings between two submissions. At
-// rest no contact cycles follow. Coarse cells outside of their boxes would receive the last sweeps of the
-// whole cycle only in the next cycle. So a voxel that barely touches the tool would be released and pressed
-// in turns.
+// After the tool moved by more than kMoved spacings between two submissions, kContactCycles contact cycles
+// follow the whole cycle in each of the next kUnsettled results. The reason: a whole cycle reduces the error
+// at the contact only a little. At rest no contact cycles follow, because then coarse cells outside of their
+// boxes would get the last sweeps of the whole cycle only in the next cycle. A voxel that barely touches the
+// tool would be released and pressed in turns.
 constexpr int kContactCycles = 4, kUnsettled = 4;
 // Cycles around a pressed rigid block that follow the whole cycle, too.
 constexpr int kBlockCycles = 4;
-constexpr double kMoved = 0.1;
+constexpr double kMoved = 0.1;  // (unit: spacing)
 // Far from the contact a change is passed on only if it is kFarther times least_m_ or more; smaller
 // ones are deferred until all is at rest. Rows within kNearRows of the contact are always passed on,
 // and so are submitted rows: a later submission would undo their deferred part.
@@ -34,6 +34,7 @@ constexpr std::size_t kNearRows = 3;
 // enough. Loads of bricks are not renewed meanwhile: they are of little use on tissue that moves far.
 constexpr float kJumped = 5.0F;
 constexpr int kCoarseFirstResults = 3;
+// Cycles on large boxes in each of these results.
 constexpr std::array<int, kCoarseFirstResults> kLargePatchCycles{3, 4, 2};
 // Number of Float8 per row that a whole cycle smooths and prolongs.
 constexpr std::size_t kGroupsOfRow = 12;
@@ -198,8 +199,9 @@ void ShadowObject::relax_coarse_first(const ObstacleView& obstacles) noexcept {
       kLargePatchCycles[static_cast<std::size_t>(kCoarseFirstResults - 1 - coarse_first_left_)];
   for (int n = 0; n < cycles; ++n)
     groups += relaxation_.relax_large_patch(state_, obstacles, held_, pressed, false);
-  // relax_region() does not run in the last such result: the whole cycle of the next result ends with it. It
-  // does not run in the first such result either: the tool then goes on to press other voxels.
+  // relax_region() does not run in the first result with coarse levels first, because the tool then goes on
+  // to press other voxels. It does not run in the last one either, because the next result has a whole cycle,
+  // which ends with relax_region().
   if (!first && coarse_first_left_ > 0) relaxation_.relax_region(state_, obstacles);
   work_ = groups / kGroupsOfRow;
 }

@@ -17,8 +17,8 @@
 // and the tick relaxes only the residual of its own motion. If the tick leaves X of its own residual and a
 // cycle of the thread leaves Y of the thread's residual, X + Y is left in total.
 //
-// Coarse cells are not exchanged: each side has its own. Changes too small to matter are deferred until all
-// is at rest.
+// Coarse cells are not exchanged: the object and the shadow have separate ones. Changes too small to matter
+// are deferred until all is at rest.
 //
 // Limits are never violated: the part of a row's motion that its links forbid is dropped, and the next
 // submission carries the actual state. After a jump of the tool the first results are of cycles on large
@@ -233,8 +233,8 @@ class ShadowObject {
   // Rows whose change is deferred until all is at rest. Some of them may have been passed on since.
   LazyArray<RowId> deferred_rows_;
   std::size_t deferred_count_ = 0;
-  LazyArray<std::uint8_t> deferred_;  // [row] 1: in deferred_rows_
-  static constexpr int kDistances = 64;
+  LazyArray<std::uint8_t> deferred_;                   // [row] 1: in deferred_rows_
+  static constexpr int kDistances = 64;                // a greater distance counts as this one less 1
   std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] first of by_distance_
   LazyArray<std::uint8_t> distance_;  // [n] distance of the nth row in the log from the contact, in rows
   LazyArray<RowId> by_distance_;      // rows of the log, nearest to the contact first

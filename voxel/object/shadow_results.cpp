@@ -180,9 +180,9 @@ void ShadowObject::apply_near(SoftObject& object, int parts) noexcept {
   apply_part(object, parts <= 1 || retries_rows_ || lattice_.has_bricks());
 }
 
-// While a fraction of the motion is still to come, the same fraction of the submitted residual stays frozen.
-// The tissue is at rest before the first part and after the last. So it is also at rest between parts, as far
-// as forces are linear.
+// A result is applied in equal parts. While a fraction of its motion is still to come, the same fraction of
+// the submitted residual stays frozen. If the tissue is at rest before the first part and after the last, it
+// is then at rest between parts, too, as far as forces are linear.
 void ShadowObject::apply_part(SoftObject& object, bool last) noexcept {
   const int left = std::max(parts_left_, 1);
   const bool whole = last || left == 1;

@@ -9,14 +9,14 @@
 namespace voxel {
 namespace {
 
-constexpr std::size_t kMost = 4096;  // largest number of moving voxels
-constexpr std::size_t kMostKnown = 8 * kMost;
+constexpr std::size_t kMost = 4096;            // largest number of moving voxels
+constexpr std::size_t kMostKnown = 8 * kMost;  // largest number of voxels with multipliers
 constexpr int kDeep = 3;  // number of layers of neighbours that belong to the region completely
 constexpr int kFar = 12;  // number of all layers; layers beyond kDeep follow only links at their limits
 constexpr int kSweeps = 30, kTickSweeps = 6;  // sweeps in a round beside moving bodies; in a tick
 constexpr int kToolSweeps = 100;              // sweeps in a round under the tool, which no tick waits for
-constexpr std::uint64_t kOtherWork = 5;
-constexpr double kFurther = 1.6;  // over-relaxation (Boyd et al., 3.4.3)
+constexpr std::uint64_t kOtherWork = 5;       // cost of all work of relax() but its sweeps (unit: sweep)
+constexpr double kFurther = 1.6;              // over-relaxation (Boyd et al., 3.4.3)
 // Distances of a link from its limit (unit: spacing). Below the first it is at its limit; below the second it
 // may reach its limit.
 constexpr double kActiveAtFirst = 1e-3;
@@ -27,11 +27,11 @@ constexpr double kTighter = 2e-5;
 // Replaces kTighter under the tool. There cycles and the tick continue from the result up to the limits
 // themselves.
 constexpr double kTighterAtTool = 2e-6;
-constexpr double kSqueezed =
-    5e-3;  // (unit: spacing) a voxel deeper in an obstacle counts as squeezed: limits keep it there
+// A voxel deeper in an obstacle than this counts as squeezed: limits keep it there (unit: spacing).
+constexpr double kSqueezed = 5e-3;
 constexpr int kRounds = 4;          // rounds that alternate between limits and obstacles
 constexpr int kMostPasses = 60;     // largest number of passes to bring one axis within its limits
-constexpr double kRounding = 1e-9;  // (unit: spacing)
+constexpr double kRounding = 1e-9;  // smaller motions count as rounding (unit: spacing)
 
 }  // namespace
 

@@ -10,8 +10,9 @@
 // minimisation. Multipliers are kept from call to call. The result is clamped to the limits, and the tissue
 // moves towards it as far as its energy falls.
 //
-// Under the tool (for objects that touch nothing else), pressed voxels and their dependents belong to the
-// region. Pressed voxels slide on their tangent planes.
+// If the object touches nothing but the tool, the region also contains the voxels that the tool presses, and
+// the voxels tied to them by links at their limits (their dependents). Pressed voxels slide on the tool's
+// tangent planes.
 //
 // Multipliers are the forces of links at their limits and of obstacles. The coarse levels get the forces of
 // links as loads (Multigrid::set_limit_load): otherwise they would pull at voxels that limits hold. A moving
@@ -39,11 +40,12 @@ class AdmmRegion {
   // Allocates all memory except the arrays by voxel, most of which a tool never touches.
   void prepare_lists();
 
-  // Relaxes a region: voxels that active limits hold or that are in `on_body`, and their neighbourhood, which
-  // extends further along links at their limits. If `on_body` is empty, the last non-empty one is used again,
-  // with more sweeps. All multipliers are dropped if no link is at its limit, or if a voxel is squeezed into
-  // an obstacle, which no multiplier balances. `briefly` halves the sweeps, for tissue that is still moving.
-  // Returns the largest force that moved a voxel (N).
+  // Relaxes a region. It consists of the voxels that active limits hold, the voxels `on_body` (that lie on a
+  // moving body), and their neighbourhood, which extends further along links at their limits. If `on_body` is
+  // empty, the last list that was not empty is used again, with more sweeps. `briefly` halves the sweeps, for
+  // tissue that is still moving. Returns the largest force that moved a voxel (N). Two cases end with nothing
+  // moved and all multipliers dropped: no link is at its limit, or a voxel is squeezed into an obstacle. No
+  // multiplier balances the force on a squeezed voxel.
   double relax(Multigrid& multigrid, Displacement& state, const ObstacleView& obstacles,
                std::span<const VoxelId> on_body, bool briefly = false) noexcept;
   // Was any link of the region at its limit in the last relax()?
@@ -79,12 +81,14 @@ class AdmmRegion {
     Axes load_N{};                  // load without the forces of its links
     Axes inverse{};                 // 1 / (springs of its links and all penalties), per axis (m/N)
     double hold_N_per_m = 0;        // penalty of its obstacle
-    Axes out{}, pressed{};  // copy of the displacement outside of the obstacle (m), and scaled multiplier (m)
+    // Displacement that ADMM keeps outside of the obstacle (m); force of the obstacle / hold_N_per_m (m).
+    Axes out{}, pressed{};
   };
   struct Link {  // from a member to its neighbour above; values per axis
     Axes stiff_N_per_m{}, low{}, high{};
-    Axes within{}, beyond{};  // copy of the difference within the limits (m), and scaled multiplier (m)
-    std::uint8_t near = 0;    // bits: axes on which it may reach a limit
+    // Difference of the ends that ADMM keeps within the limits (m); force of the limit / penalty (m).
+    Axes within{}, beyond{};
+    std::uint8_t near = 0;  // bits: axes on which it may reach a limit
   };
 
   std::uint32_t add(VoxelId v) noexcept;
@@ -113,9 +117,8 @@ class AdmmRegion {
   LazyArray<std::uint32_t> number_;  // [v] 1 + index into members_; 0: none
   // The following members are kept from call to call.
   LazyVector<VoxelId> known_;
-  LazyArray<std::uint32_t>
-      asked_;  // [v] number of the last call that used its multipliers; 0: it has no multipliers
-  // [3 axis + d][v] scaled multiplier of the link to the voxel above (m)
+  LazyArray<std::uint32_t> asked_;  // [v] number of the last call that used its multipliers; 0: it has none
+  // [3 axis + d][v] Link::beyond of the link to the voxel above (m).
   std::array<LazyArray<float>, 9> beyond_;
   std::array<LazyArray<float>, 3> pressed_;  // [axis][v] force of the obstacle (N)
   std::uint32_t calls_ = 0;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostVoxels = 20'000;      // largest number of voxels in a cluster
 constexpr std::uint64_t kMostLookedAt = 40'000;  // largest number of voxels visited since begin()
-constexpr std::uint8_t kIn = 1;
+constexpr std::uint8_t kIn = 1;                  // bit of mark_: the voxel is in the current cluster
 // A link nearer to its limit than this blocks motion (unit: spacing).
 constexpr float kExactlyAtLimit = 1e-6F;
 

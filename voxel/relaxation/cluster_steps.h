@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Active-set step for voxels that can only move together.
 //
-// A voxel whose net force pushes against an active limit does not move alone. A row of voxels without slack
-// along itself would never move at all. A cluster is the least set that has to move with such a voxel
-// (breadth-first search over links at their limits). It moves as one body to the equilibrium of its border's
-// springs, or to the next limit. This is the block step of an active-set method for a quadratic function
-// under difference constraints (Nocedal & Wright, Numerical Optimization, chapter 16).
+// A voxel whose net force pushes against an active limit cannot move alone. For example, a row of voxels
+// without slack along itself would never move if its voxels moved one by one. A cluster is the smallest set
+// of voxels that has to move with such a voxel. A breadth-first search over links at their limits finds it.
+// It moves as one body to the equilibrium of its border's springs, or to the next limit. This is the block
+// step of an active-set method for a quadratic function under difference constraints (Nocedal & Wright,
+// Numerical Optimization, chapter 16).
 #pragma once
 
 #include <array>

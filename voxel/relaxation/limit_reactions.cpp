@@ -158,8 +158,9 @@ void LimitReactions::gather(LevelStiffness& couplings, Displacement& state, std:
     if (may_be_at_limit(lattice_, state, v, axis, kSurelyFree)) look_at(v / kRow);
   }
   find_all();
-  // A source may lie beside a dependent of another source. Its row is looked at, too, so that dependents()
-  // does not count the link between the two as a link to other voxels.
+  // A source may lie beside a dependent of another source. So the rows of such sources are read, too.
+  // Otherwise dependents() would count the link between the two as a link to a voxel that is neither source
+  // nor dependent.
   for (const VoxelId v : sources) {
     if (rows_.empty()) break;
     if (find(v / kRow) != nullptr) continue;

@@ -31,9 +31,10 @@ class LimitReactions {
   explicit LimitReactions(const Lattice& lattice);
 
   // ---- none of these allocates or throws ----
-  // Finds, on one axis, all dependents of `sources` (sorted by id, none anchored), directly or through
-  // others. A voxel depends on a neighbour in two cases. Either their link is at a limit and pushes the voxel
-  // against its own load, or the link lets the voxel move neither way. Earlier results are dropped.
+  // Finds, on one axis, all dependents of `sources` (sorted by id, none anchored): voxels that depend on a
+  // source, or on another dependent. A voxel depends on a neighbour in two cases. Either their link is at a
+  // limit and pushes the voxel against the load of its own springs, or the link lets the voxel move in
+  // neither direction. Earlier results are dropped.
   void gather(LevelStiffness& couplings, Displacement& state, std::span<const VoxelId> sources,
               int axis) noexcept;
   // Finds, on one axis, all dependents of a rigid block. The load of a voxel in another block is the load of

@@ -6,9 +6,11 @@
 // around it. So its cost hardly depends on the size of the object. A cycle is complete in itself: a cycle
 // elsewhere never meets its corrections half prolonged.
 //
-// Around the contact there is a cycle in every tick. Under asynchronous relaxation a cycle around a large
-// patch may be split over ticks, and no other cycle runs between its parts. Elsewhere dirty tiles are relaxed
-// one after the other, within a budget of voxel updates. The budget counts work, never time.
+// Around the contact there is a cycle in every tick (a *contact cycle*). Under asynchronous relaxation a
+// cycle around a large patch may be split over ticks, and no other cycle runs between its parts. Elsewhere
+// *tiles* (blocks of rows, dirty_tiles.h) in which something moved are relaxed one after the other, within a
+// budget of voxel updates. The budget counts work, never time. A *round* is one visit of all tiles that wait.
+// Terms of limits are explained in fas.h.
 #pragma once
 
 #include <algorithm>
@@ -84,8 +86,8 @@ class Relaxation {
   // smoothed: call relax_around_blocks() after it. Returns the number of Float8 visited.
   std::size_t run_whole_coarse_first(Displacement& state, const ObstacleView& obstacles,
                                      std::span<const VoxelId> held) noexcept;
-  // Relaxes voxels that limits hold under the tool (AdmmRegion). Call it after cycles that do not end a
-  // round.
+  // Relaxes voxels that limits hold under the tool (AdmmRegion). Rounds do so at their end; call it after
+  // cycles that do not end a round.
   void relax_region(Displacement& state, const ObstacleView& obstacles) noexcept;
   // Runs a cycle around each rigid block that the tool presses, because the force depends on the springs all
   // around the block.
@@ -119,12 +121,13 @@ class Relaxation {
   [[nodiscard]] bool left_to_shadow() const { return left_to_shadow_; }
   // True while a submitted state is with the shadow.
   [[nodiscard]] bool shadow_busy() const { return shadow_busy_; }
-  // Call when the state was submitted to the shadow. This Relaxation does nothing until something moves. The
-  // residual near the contact is frozen, because the shadow owns it.
+  // Call when the state was submitted to the shadow. From then on the shadow reduces the residual of this
+  // state. So near the contact this residual is frozen: the tissue counts as at rest here until it moves
+  // again.
   void assign_residual(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] bool idle() const { return asleep_; }
-  // drop_coarse() does work of assign_residual() and resume() ahead of time, on rows_to_drop() rows. Pending
-  // corrections are lost.
+  // assign_residual() and resume() set the coarse cells of rows_to_drop() rows to 0. Call drop_coarse() in an
+  // earlier tick to have this work done there. Pending corrections are lost.
   [[nodiscard]] std::size_t rows_to_drop() const noexcept { return multigrid_.rows_to_drop(); }
   void drop_coarse() noexcept {
     end_contact();
@@ -149,8 +152,8 @@ class Relaxation {
     }
   };
   [[nodiscard]] const NearRows& near_contact() const { return near_; }
-  // Largest force on any free voxel (N), as the last round found it. Below the tolerance its exact value is
-  // unknown.
+  // Largest force on any free voxel (N), as the last round found it. Rounds skip rows at rest, so below the
+  // tolerance the value is not exact.
   [[nodiscard]] double residual_N() const { return residual_N_; }
   // Relaxation stops when the residual falls below this (N), or has not fallen for a while: under active
   // limits a residual remains that no relaxation removes. Default: half of kRestingResidual of the lattice's
@@ -163,8 +166,8 @@ class Relaxation {
   void prepare_under_tool();     // call for a shadow, whose rounds relax under the tool
   // Copies the state of `other`, which has the same lattice.
   void copy_from(const Relaxation& other) noexcept;
-  // Restricts all coarse cells anew, after copy_from(): `other` was left to a shadow and has hardly any
-  // coarse cells.
+  // Call it after copy_from() if `other` is relaxed by a shadow, because it then has hardly any coarse cells.
+  // Restricts all coarse cells anew.
   void renew_coarse(Displacement& state, const ObstacleView& obstacles) noexcept;
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -217,7 +220,7 @@ class Relaxation {
   struct Planes {
     int first = 0, last = 0;
   };
-  static constexpr Planes kAllPlanes{0, 1 << 24};
+  static constexpr Planes kAllPlanes{0, 1 << 24};  // planes beyond the box do not count
   [[nodiscard]] int planes_of_step(int n) const noexcept;
   [[nodiscard]] int steps() const noexcept { return static_cast<int>(steps_now().size()); }
   void cycle(Displacement& state, const ObstacleView& obstacles, Look look) noexcept {

@@ -13,6 +13,9 @@ namespace {
 
 constexpr std::uint64_t kLetGoEvery = 8;  // without gain, active limits are released once in this many rounds
 constexpr int kPatience = 40;             // cycles without gain before an object counts as resting
+// The factor of boundary springs, boundary_scale_, is at least 1. A round whose residual exceeds kWorse times
+// that of the round before multiplies the factor by kHarder, to kHardest at most. Any other round, and the
+// first one after wake(), multiplies it by kSofter.
 constexpr double kWorse = 1.05;
 constexpr float kHarder = 8.0F, kSofter = 0.97F, kHardest = 1e4F;
 constexpr double kGain = 0.98;      // a residual below this share of the least one so far is a gain
@@ -56,8 +59,9 @@ bool Relaxation::relax_region(Displacement& state, const ObstacleView& obstacles
   return region_->at_limits();
 }
 
-// Moves the clusters at active limits of this round; returns the largest force per voxel that moved one (N).
-// The first voxel differs in each round, so that all have their turn in a limited budget.
+// Moves the clusters of all voxels that active limits hold (cluster_steps.h). Returns the largest force per
+// voxel that moved a cluster (N). Each round begins with another voxel: the number of visited voxels is
+// limited, and each voxel has to have its turn.
 double Relaxation::step_clusters(Displacement& state, const ObstacleView& obstacles) noexcept {
   cluster_steps_.begin();
   double most_N = 0.0;
@@ -125,8 +129,9 @@ void Relaxation::end_round(Displacement& state, const ObstacleView& obstacles, d
     region_->forget(multigrid_);
     if (cycles_without_gain_ <= 1 || cycles_ % kLetGoEvery == 0) multigrid_.release_active();
   }
-  // Scattered held voxels fix a cell more firmly than a patch of them. A round that ends worse than the one
-  // before raises the factor of boundary springs.
+  // Held voxels that lie scattered fix their cells more firmly than their boundary springs do. Corrections of
+  // coarse levels then go too far, and a round ends worse than the one before. Such a round raises the factor
+  // of the boundary springs.
   if (residual_N > kWorse * residual_N_ && cycles_without_gain_ > 0) {
     boundary_scale_ = std::min(boundary_scale_ * kHarder, kHardest);
   } else {

@@ -7,10 +7,10 @@
 namespace voxel {
 namespace {
 
-constexpr int kCoarsestSweeps = 8;
-constexpr int kContactSweeps = 4;  // sweeps on the coarsest level, under asynchronous relaxation
+constexpr int kCoarsestSweeps = 8;  // sweeps on the coarsest level of a cycle
+constexpr int kContactSweeps = 4;   // replaces kCoarsestSweeps under asynchronous relaxation
 // Levels of a contact cycle under asynchronous relaxation. The shadow relaxes tissue further away. If contact
-// cycles moved the coarsest cells, too, they would disturb the shadow's cycles, and conversely.
+// cycles moved the coarsest cells, too, contact cycles and the shadow's cycles would disturb one another.
 constexpr int kContactLevels = 5;
 // Cost of smoothing and of restricting a Float8 of cells (unit: Float8 prolonged). kOfVoxels: factor for
 // voxels, which have limits and obstacles.

@@ -17,7 +17,8 @@
 namespace voxel {
 namespace {
 
-constexpr std::uint32_t kUndefined = 0xffffffffU;
+constexpr std::uint32_t kUndefined = 0xffffffffU;  // length of an element whose end is marked by an item
+// Tags of elements: group in the upper 16 bits, number in the lower (DICOM PS3.5 and PS3.6).
 constexpr std::uint32_t kItem = 0xfffee000U;
 constexpr std::uint32_t kItemEnd = 0xfffee00dU;
 constexpr std::uint32_t kSequenceEnd = 0xfffee0ddU;
@@ -262,7 +263,7 @@ class Walker {
     }
   }
 
-  static constexpr std::uint64_t kNoEnd = ~std::uint64_t{0};
+  static constexpr std::uint64_t kNoEnd = ~std::uint64_t{0};  // end of a sequence of undefined length
 
   // An open sequence, item or packed pixel element. An item of known length needs no entry, because its
   // sequence has one.

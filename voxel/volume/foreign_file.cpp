@@ -32,7 +32,7 @@ const std::array<PackedKind, 6>& packed_kinds() {
 }  // namespace
 
 void refuse_foreign_file(const std::filesystem::path& path, bool may_be_gzip) {
-  constexpr std::size_t kFirstBytes = 512;
+  constexpr std::size_t kFirstBytes = 512;  // bytes that are enough to recognise a format
   std::ifstream file(path, std::ios::binary);
   std::string start(kFirstBytes, '\0');
   file.read(start.data(), static_cast<std::streamsize>(start.size()));

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int32_t kNiftiBytes = 348;
+constexpr std::int32_t kNiftiBytes = 348;  // size of a NIfTI-1 header, which it also states
 
 struct NiftiHeader {
   std::array<unsigned char, kNiftiBytes> bytes{};

@@ -52,7 +52,7 @@ TextHeader read_text_header(const fs::path& path, char separator, const std::str
   // MetaIO reads a line into a buffer of 1,024 characters without checking its length. 3D Slicer writes NRRD
   // headers with lines of 2,000.
   const std::size_t longest_line = separator == '=' ? 1000 : 100'000;
-  constexpr std::size_t kMostLines = 10'000;
+  constexpr std::size_t kMostLines = 10'000;  // a header with more lines is broken
   std::ifstream file(path, std::ios::binary);
   TextHeader header;
   std::string line;

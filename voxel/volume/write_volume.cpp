@@ -287,7 +287,7 @@ std::string nrrd_header(const Saved& s, const std::string& data_file) {
   return out.str();
 }
 
-constexpr int kSizeDigits = 20;
+constexpr int kSizeDigits = 20;  // digits that are reserved for the size of the data (bytes)
 
 std::string meta_header(const Saved& s, const std::string& data_file) {
   std::ostringstream out;

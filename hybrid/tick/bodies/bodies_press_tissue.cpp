@@ -239,10 +239,10 @@ class TissueAtBodies {
         s, {glm::vec3(along / part), static_cast<float>(glm::dot(along / part, u) + depth / part), true});
     return true;
   }
-  // Depth (m) by which a voxel may stay in a body. A jammed voxel cannot leave the body altogether, and the
-  // wave must not require it. Otherwise the wave would pull neighbours of the voxel into the body, through
-  // links at their limits, and the neighbours would pull the voxel out. Of two voxels that are pulled apart
-  // the wave favours one, so bodies would creep without end.
+  // Depth (m) by which a voxel may stay in a body. A jammed voxel cannot leave the body completely, and the
+  // wave must not demand it. Otherwise the wave would pull neighbours of the voxel into the body, through
+  // links at their limits, and these neighbours would in turn pull at the voxel. Of two voxels that are
+  // pulled apart the wave favours one, so bodies would creep without end.
   [[nodiscard]] double tolerated_depth_m(std::uint32_t s) const noexcept {
     return beside_.jammed[s] != 0 ? kJammedProbe * spacing_m_ : 0.0;
   }

@@ -8,9 +8,9 @@
 // relaxation does the rest. A voxel has one half-space: that of the nearer of body and bone, or that of the
 // bone if the voxel is inside both.
 //
-// The map lists the voxels in the body's box. Each distance query notes how far body and voxel together may
-// move before the voxel can be near. No query is made earlier, so nearly all exact queries are for voxels
-// that are near.
+// The map lists the voxels in the body's box. A query of a voxel's distance also gives the sum of the motions
+// of body and voxel before which the voxel cannot be near. Until then the voxel is not queried again. So
+// nearly all exact queries are for voxels that are near.
 #pragma once
 
 #include "hybrid/world/world_state.h"

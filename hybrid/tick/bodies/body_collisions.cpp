@@ -23,9 +23,9 @@ constexpr double kContactStiffness = 1e5;
 constexpr double kSamePlane = 1e-9;  // 1 − cosine of the angle between normals of the same plane
 // Points nearer than this slide along their edges (unit: the smaller object's diagonal).
 constexpr double kSlideRange = 0.05;
-constexpr double kLeastSlide = 0.01;  // shorter slides are skipped (unit: the point's reach)
-constexpr double kStride = 0.02;      // step along a way (unit: the smaller object's diagonal)
-constexpr int kMostStrides = 32;
+constexpr double kLeastSlide = 0.01;                 // shorter slides are skipped (unit: the point's reach)
+constexpr double kStride = 0.02;                     // step along a way (unit: the smaller object's diagonal)
+constexpr int kMostStrides = 32;                     // steps along one way, at most
 constexpr int kRounds = 6;                           // maximum repetitions of solving and following ways
 constexpr std::size_t kMaxCollisionQueries = 20000;  // exact queries a tick
 // Range within which a body that gives way is stopped (unit: the smaller object's diagonal).
@@ -236,8 +236,9 @@ class Collisions : private CollisionQueries {
     }
     return true;
   }
-  // Adds a contact with the half-space that a point met on its way. The contact's gap is the one that the
-  // last solution leaves at the end of the way, but without the free bodies' motion in that solution.
+  // Adds a contact between a point and the half-space that it met on its way. The contact's gap is the
+  // distance at the end of the way, without the part that the free bodies' motion in the last solution
+  // contributes: the next solution finds this motion anew.
   void add_contact_on_way(BodyPair& pair, Side side, std::size_t i, const NearestSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const auto [from, to] = way_of(pair, side, i);

@@ -16,7 +16,7 @@ namespace hybrid {
 
 class CollisionQueries {
  public:
-  using Side = std::size_t;  // 0: points of the free object at the other's surface; 1: the reverse
+  using Side = std::size_t;  // 0: points of the free object; 1: points of the other object
 
   CollisionQueries(const World& world, WorldState& state, double dt_s)
       : world_(world), state_(state), all_(state.collisions), dt_s_(dt_s) {}

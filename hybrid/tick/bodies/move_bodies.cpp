@@ -15,9 +15,9 @@ namespace {
 
 // Greatest number of attempts to move the proxy aside when a body pushes it into another body.
 constexpr int kMaxWaysAside = 8;
-// A body rests after kRestTicks ticks in which it moves no further than kRestMotion (spacings) and the change
-// of force and the unbalanced force stay below kRestForce of the load. A resting body wakes when it exceeds
-// kWakeFactor times these bounds.
+// A body comes to rest after kRestTicks ticks in which it moves by at most kRestMotion (spacings) and two
+// forces are below kRestForce (share of the load): the change of the force on it, and the unbalanced force.
+// It wakes when it exceeds kWakeFactor times one of these bounds.
 constexpr std::uint32_t kRestTicks = 100;
 constexpr double kRestMotion = 1e-5, kRestForce = 1e-3, kWakeFactor = 3.0;
 // A proxy this near to a place counts as being there (unit: the ball's radius).

@@ -21,9 +21,9 @@ constexpr double kFreeLift = 0.005;  // spacings: lift per tick for which no kin
 constexpr double kOnBody = 1e-3;     // spacings: a voxel this near to the body lies on it
 // Regularises directions that the normals hardly span. Unit: trace of the sum of n nᵀ over the normals n.
 constexpr double kRegularisation = 1e-3;
-// Factor on the stiffness of links. The part beyond 1 acts as a damper. Under asynchronous relaxation tissue
-// acts as a spring between two results, and a result may return energy that tissue took up before an earlier
-// result. Without the damper bodies would hop.
+// Factor on the stiffness with which links resist a body. The part beyond 1 acts as a damper. It is needed
+// under asynchronous relaxation: between two results tissue acts as a spring, and a result may return energy
+// that tissue took up before an earlier result. Without the damper bodies would hop.
 constexpr double kLinkDamping = 3.0;
 // Factor on the stiffness of links at their limits. Their shares of a load change abruptly, which would make
 // bodies jitter.
@@ -150,12 +150,13 @@ double distance_to_body_m(const voxel::SoftObject& object, std::uint32_t s, cons
 // Adds the contact forces of the listed voxels. The force of a contact is the one that pulls its voxel into
 // the body along the normal.
 //
-// If multipliers of limits and obstacles are known that balance all loads, they are the forces. Otherwise
-// links at their limits pass loads from voxel to voxel, also across the normals, so only the sum of these
-// loads is known. The normal forces may lack a part of this sum. That part is divided among the voxels at
-// limits along their normals, with the least sum of squared shares. If each voxel got the load that the links
-// account to it instead, a ball would turn, which no surface without friction can cause. The shares have no
-// torque that a box could rest on, so multipliers are preferred.
+// If AdmmRegion has found multipliers that balance all loads, these are the forces. Otherwise only the sum of
+// the loads is known where links are at their limits, because such links pass loads from voxel to voxel, also
+// across the normals. The forces along the normals may lack a part of this sum. This part is divided among
+// the voxels at limits, along their normals, such that the sum of the squared shares is least. If instead
+// each voxel got the load that its links show, a ball would turn, although no surface without friction can
+// turn a ball. The shares are not exact either: their torque does not support a box. So multipliers are
+// preferred.
 void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   const voxel::SoftObject& object = *state.soft[o];
   const BodyObstacles& beside = state.body_obstacles[o];

@@ -12,9 +12,9 @@
 namespace hybrid {
 namespace {
 
-constexpr int kShadingPasses = 8;
-constexpr int kSlidingPasses = 8;
-// Of the friction: a tangential pull that exceeds it by less is on the cone.
+constexpr int kShadingPasses = 8;  // sweeps of shade(), at most
+constexpr int kSlidingPasses = 8;  // sweeps of apply_friction(), at most
+// A tangential pull that exceeds the friction by less than this share of it counts as on the friction cone.
 constexpr double kConeTolerance = 1e-4;
 constexpr double kShadingConverged = 1e-6;  // of the depth: a pass that moves the proxy less is the last
 
@@ -99,8 +99,9 @@ struct Goal {
   double travel = 0.0;
 };
 
-// The contact forces on a proxy that does not move: of planes through the proxy, against the pull to the
-// target. Sets each force; returns their sum, zero if the target pulls the proxy off.
+// The contact forces on a proxy that stays in place: those with which its contact planes, shifted through the
+// proxy, resist the pull to the target. Sets each force and returns their sum. The sum is zero if the target
+// pulls the proxy off the surface.
 glm::dvec3 press_in_place(Contacts& contacts, const glm::dvec3& proxy, const Goal& goal) noexcept {
   const glm::dvec3 way = goal.target - proxy;
   std::array<polygon::ContactPlane, 3> planes;
@@ -170,8 +171,9 @@ Sweep split_force(WorldState& state, const Goal& goal, std::uint32_t from_object
 
 // Keeps or slides a proxy that is pressed on `contacts`. False if there is no friction or no pressure.
 //
-// If the surface turns within the slide, a pull on the cone of the first normal is not on that of the last
-// normal. The slide goes on from there until it is.
+// The slide ends when the pull is on the friction cone. If the surface turns on the way, a pull on the cone
+// of the first normal is not on the cone of the last normal. So slides are repeated from the place reached,
+// until the pull is on the cone there.
 bool apply_friction(const World& world, WorldState& state, Contacts contacts, const Goal& goal,
                     bool first_pass, Sweep& sweep) noexcept {
   const MixedFeel feel = mixed_feel(contacts);
@@ -265,8 +267,9 @@ glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& 
   for (const Contact& c : contacts) {
     if (c.feel->texture == nullptr) continue;
     const BodyFrame& frame = state.rigid[c.number].frame;
-    // Evaluated at the point of the surface under the device. A proxy held by friction or by another surface
-    // is elsewhere: its relief would push the hand over a way that the hand does not move, and add energy.
+    // The relief is evaluated at the point of the surface under the device, not at the proxy. Friction or
+    // another surface may hold the proxy elsewhere. The relief at the proxy would push the hand although the
+    // hand does not move over that relief, and so add energy.
     const double depth = glm::dot(state.proxy_m - device_m, c.normal);
     const glm::dvec3 over = device_m + (depth - world.contact_radius_m()) * c.normal;
     const TexturedContact contact{frame.to_body(over), c.normal * frame.rotation, c.force_N / k, k};

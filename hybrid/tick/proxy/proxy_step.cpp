@@ -36,7 +36,7 @@ double gather_planes(const World& world, WorldState& state, const glm::dvec3& po
       const glm::dvec3 away = point - on_surface;
       const double distance = glm::length(away);
       if (!(distance > 0.0))
-        continue;  // on the surface itself no side is right: the neighbouring elements decide
+        continue;  // a point on the surface has no side; the planes of neighbouring elements decide
       const glm::dvec3 normal = away / distance;
       state.scratch.planes.push_back(
           {normal, glm::dot(normal, on_surface) + world.contact_radius_m(), o, near.element});

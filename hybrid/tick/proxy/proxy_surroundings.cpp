@@ -9,13 +9,15 @@
 namespace hybrid {
 namespace {
 
-constexpr int kMaxShrinks = 20;       // of the margin of a crowded survey
-constexpr int kCrowded = 4;           // shrinks after which the crowd must be the pole of a fan of triangles
-constexpr double kShrink = 0.125;     // of the margin of a crowded survey
-constexpr double kCentreAhead = 0.6;  // of its margin: how far ahead of the proxy a survey is centred
-// How far from the surface a ball's survey is centred, in margins, but no further than the ball's radius. The
-// neighbourhood is then a larger ball that reaches as far along the surface and holds much less of the
-// surface.
+// A survey that finds too many elements is repeated with the margin times kShrink, at most kMaxShrinks times.
+// After kCrowded repetitions there must be the pole of a fan, where very many triangles share a corner.
+constexpr int kMaxShrinks = 20;
+constexpr int kCrowded = 4;
+constexpr double kShrink = 0.125;
+constexpr double kCentreAhead = 0.6;  // distance from the proxy to the centre of a survey (unit: margin)
+// Height above the surface at which a ball's survey is centred (unit: margin), but at most the ball's radius.
+// The survey then covers a larger ball of places, which reaches as far along the surface but has far fewer
+// elements within touching distance (reach_of()).
 constexpr double kLift = 4.0;
 // Target number of elements in a survey. Fewer are soon left behind, more take long to read. A ball has more
 // elements in contact range than a point has.
@@ -23,10 +25,11 @@ constexpr double kGoodCount = 16.0, kGoodUnderBall = 104.0;
 // The margin doubles for a longer way only below this count (unit: elements): the next count is at most four
 // times as large, and fits Neighbourhood::kCapacity.
 constexpr double kMostBeforeGrowth = 0.125 * polygon::Neighbourhood::kCapacity;
-// Work of a survey beyond its elements, of a renewed plane, and planes read in a row that cost as much as one
-// element.
+// Work, in elements listed: of a survey beside its elements; of a plane that is made anew. kPlanesOfWork:
+// number of planes that are read at the cost of one element.
 constexpr std::uint32_t kWorkOfSurvey = 32, kWorkOfPlane = 2, kPlanesOfWork = 64;
-// Of the last count: if about half of the margin still finds this many, the proxy is at a pole.
+// The proxy is at the pole of a fan if a survey finds more than kPoleCount times the elements of the last
+// one, although its margin is less than kPoleMargin times the last margin.
 constexpr double kPoleCount = 0.7;
 constexpr double kPoleMargin = 0.6;
 constexpr double kRangeGrowth = 4.0;  // growth of the range when it cut a step
@@ -37,7 +40,7 @@ double max_component(const glm::dvec3& v) noexcept {
 
 }  // namespace
 
-// The proxy came here other than by the last sweep: cached planes may have it on the wrong side.
+// Makes the planes anew that `from` violates.
 void ProxySurroundings::renew_planes(const glm::dvec3& from) noexcept {
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
     if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object))
@@ -113,9 +116,10 @@ bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool mov
   return false;
 }
 
-// Where a survey is centred and how far it reaches, so that the proxy may move by the margin along the
-// surface, and further ahead. A ball of centres of radius s whose middle is t above the surface holds
-// elements within about sqrt(2 r (s - t)) of the contact: the higher, the fewer.
+// Centre and reach of a survey, such that the proxy may move by the margin along the surface, and further
+// ahead. If the centre is t above the surface and the reach is s, a ball of radius r may touch the elements
+// within about sqrt(2 r (s − t)) of the contact. The higher the centre, the smaller s − t, and the fewer the
+// elements.
 ProxySurroundings::Reach ProxySurroundings::reach_of(const RigidState& near, const glm::dvec3& view,
                                                      bool moving) const noexcept {
   const double margin = near.margin_m;
@@ -199,8 +203,9 @@ ProxyPlane ProxySurroundings::first_in_the_way(const glm::dvec3& q, double fract
   return first;
 }
 
-// Planes seen from another viewpoint report an element too soon, never too late. The soonest of them is
-// therefore renewed from here, until the soonest one is up to date.
+// A plane that was made from another viewpoint may stop the way before the way meets its element, but never
+// lets it through. So the plane that stops the way first is made anew from the present viewpoint. This is
+// repeated until the plane that stops the way first is a new one.
 void ProxySurroundings::first_in_object(std::uint32_t o, const glm::dvec3& q, double fraction,
                                         std::span<const ProxyPlane> held, ProxyPlane& first,
                                         double& soonest) noexcept {
@@ -212,8 +217,8 @@ void ProxySurroundings::first_in_object(std::uint32_t o, const glm::dvec3& q, do
   constexpr double kWholeWay = 2.0;  // no part of the way is cut
   const auto clear_part = [&](const polygon::SeparatingPlane& plane) {
     const auto depth = [&plane](const glm::dvec3& at) { return plane.offset - glm::dot(plane.normal, at); };
-    // A plane that only the first part of the way violates, by the rounding of the proxy's place, is being
-    // left.
+    // The way leaves a plane that only its first part violates: there the proxy is on the wrong side by
+    // rounding.
     if (!(depth(end) > tolerance && depth(goal) > tolerance)) return kWholeWay;
     return polygon::Neighbourhood::fraction_before(plane, view, end);
   };

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rigid objects around the proxy, as a sweep sees them: which are near, the range in which that is known,
-// and what stands in a straight way. The result is kept from tick to tick in WorldState; the map and the
-// meshes are queried only beyond its range.
+// The rigid objects around the proxy, for a sweep (proxy_sweep.h): which objects are near, in which range
+// this is known, and which element a straight way meets first. This knowledge is kept from tick to tick in
+// WorldState. The map and the meshes are queried only when the proxy leaves the known range.
+//
+// Terms: a *survey* queries one object for all elements that the proxy may touch while it moves by at most
+// the *margin*. Each element gets a plane between it and the *viewpoint*, a place of the proxy
+// (polygon::Neighbourhood). Planes that bound the present step are *held*.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +35,8 @@ class ProxySurroundings {
         radius_(world.contact_radius_m()),
         rounding_(world.rounding_m) {}
 
-  // Call when the proxy came to `from` other than by the last sweep: cached planes may have it on the wrong
-  // side.
+  // Call it if something other than the last sweep moved the proxy to `from`: the proxy may be on the wrong
+  // side of kept planes.
   void renew_planes(const glm::dvec3& from) noexcept;
 
   // Makes `point` the viewpoint. Queries again if the known range does not cover it, or ended the last way.

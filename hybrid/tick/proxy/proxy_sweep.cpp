@@ -11,14 +11,17 @@
 namespace hybrid {
 namespace {
 
-constexpr std::uint32_t kMaxSteps = 64;
+constexpr std::uint32_t kMaxSteps = 64;      // steps of one sweep
 constexpr std::uint32_t kMaxExchanges = 64;  // planes added or renewed in one step
 constexpr std::uint32_t kMaxCrossings = 16;  // of nearly flat edges, in one sweep
 // A shorter step ends the sweep; relative to the way to the target, and to the ball's radius.
 constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
+// When no plane holds the proxy any more, the next obstacle is near. So the first search covers only a part
+// of the way, kShortPart of the last step's length. Without an obstacle there, the part is multiplied by
+// kPartGrowth. kLeastPart: lower bound (unit: the way).
 constexpr double kShortPart = 0.05, kPartGrowth = 32.0, kLeastPart = 1e-9;
-// Steps round an edge or a corner (unit: the ball's radius): how far beyond the minimum over its planes a
-// step may go, and the length over which the turning of the planes is measured.
+// For a round step (take_round_step()), in units of the ball's radius: how far beyond the minimum over the
+// present planes it may go; the length over which the turning of the planes is measured.
 constexpr double kRoundStep = 0.5, kTurnStep = 1e-4;
 
 class Sweeper {
@@ -114,8 +117,10 @@ class Sweeper {
     return glm::dot(q - target_, metric_ * (q - target_));
   }
 
-  // At a round edge or corner the proxy goes on to where the minimum will be when the planes have turned.
-  // Such a step goes uphill, so that the next step must pay for it.
+  // A ball rolls over an edge or a corner, and the plane there turns as it moves. A round step goes to the
+  // place where the minimum will be once the planes have turned (polygon/proxy/round_contact.h). The cost
+  // there is higher than at the minimum over the present planes. So the next step has to end at a lower cost
+  // than that minimum (round_step_paid()).
   bool take_round_step(double still, double travel) noexcept {
     if (round_.waits > 0) --round_.waits;
     if (round_.waits > 0 || round_.taken || fraction_ != 1.0 || minimum_.active_count == 0 ||
@@ -158,7 +163,7 @@ class Sweeper {
   // takes no round step for a while.
   bool round_step_paid() noexcept {
     const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
-    constexpr double kSame = 1.0 + 1e-14;
+    constexpr double kSame = 1.0 + 1e-14;  // allows for rounding of the cost
     if (cost(reached) <= kSame * cost(round_.instead)) return true;
     round_.taken = false;
     round_.waits = round_.patience *= 2;
@@ -167,8 +172,8 @@ class Sweeper {
     return false;
   }
 
-  // The proxy is at the minimum on one triangle's plane. If the plane of the next triangle is nearer to the
-  // target, and only a nearly flat edge lies between, it crosses that edge; and so on.
+  // The proxy is at the minimum on one triangle's plane. While the plane of a neighbouring triangle is nearer
+  // to the target, and only a nearly flat edge lies between the two, the proxy crosses to that triangle.
   enum class Crossing : std::uint8_t { none, moved, arrived };
   Crossing cross_edges(glm::dvec3& point, double& travel) noexcept {
     if (held_count_ != 1 || !held_[0].flat || scope_.kind != Scope::Kind::all || !isotropic_)
@@ -255,8 +260,9 @@ class Sweeper {
         end_way_before(first);
         return true;
       }
-      // Found by the plane across its closest point, which shows first where the way meets it. Held by
-      // the element's own plane, on which the proxy arrives in one step instead of by halving.
+      // first_in_the_way() found the element by the plane that is perpendicular to the line from the ball to
+      // the element's closest point. That plane tells where the way meets the element. The step is bounded by
+      // the plane of the element's face instead, because on that plane the proxy arrives in one step.
       make_plane(first);
       held_[held_count_++] = first;
       state_.scratch.planes.push_back(in_scene(first));
@@ -264,8 +270,9 @@ class Sweeper {
     return true;
   }
 
-  // Too many planes for one step: the way ends at the next plane, as it was found. The element's own plane
-  // would be reached later, and elements not examined yet may stand before it.
+  // For a step with too many planes: ends the way at the plane `next`, as it was found. The way would reach
+  // the plane of the element's face later, but elements that were not examined yet may stand before that
+  // plane.
   void end_way_before(const ProxyPlane& next) noexcept {
     const BodyFrame& frame = state_.rigid[next.object].frame;
     const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
@@ -290,8 +297,8 @@ class Sweeper {
     if (!held.flat) held.in_body = polygon::separating_plane(surface, held.element, view, radius_);
   }
 
-  // An element's own plane reaches beyond the element, where nothing supports the proxy. True if there was
-  // such a contact, and the step must be repeated.
+  // The plane of an element's face extends beyond the element, where nothing supports the proxy. Replaces
+  // such planes of active contacts. Returns true if there was any; the step must then be repeated.
   bool loosen_false_contacts() noexcept {
     bool any = false;
     for (std::uint32_t n = 0; n < minimum_.active_count; ++n) {
@@ -304,8 +311,8 @@ class Sweeper {
     return any;
   }
 
-  // True if no plane holds the proxy, or only elements' own planes at points of the elements. No plane would
-  // then change if seen from `point`, so this minimum is final.
+  // True if each held plane is that of an element's face and touches the element at `point`, or if no plane
+  // is held. Such planes do not depend on the viewpoint, so this minimum is final.
   [[nodiscard]] bool held_by_own_planes(const glm::dvec3& point) noexcept {
     for (std::uint32_t n = 0; n < held_count_; ++n) {
       held_[n].touching = held_[n].flat && touches(held_[n], point);
@@ -318,8 +325,9 @@ class Sweeper {
     const glm::dvec3 view = state_.rigid[held.object].frame.to_body(point);
     const polygon::NearPoint near = world_.rigid[held.object].surface->closest(held.element, view);
     if (!held.flat) return near.distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
-    // The closest point must be the foot on the plane. By distance alone, a ball would still lie on a
-    // triangle after it passed the edge by the square root of the tolerance.
+    // The ball lies on the face if the closest point of the element is the foot of the perpendicular on the
+    // plane. The distance alone is a poor test: beyond an edge it grows only with the square of the way, so
+    // it would stay within the tolerance for up to the square root of the tolerance.
     const glm::dvec3 away = view - near.point;
     const glm::dvec3 aside = away - glm::dot(away, held.in_body.normal) * held.in_body.normal;
     return glm::length(aside) <= 4.0 * rounding_;

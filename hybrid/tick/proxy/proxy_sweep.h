@@ -14,15 +14,15 @@ struct Sweep {
   std::uint32_t work = 0;                // elements listed and planes renewed, weighted by their cost
 };
 
-// Work after which a sweep ends where it is: outside everything, on its way. It goes on in the next tick. The
-// last survey or step may add to it what one neighbourhood takes (unit: elements listed).
+// A sweep that has done this work ends on its way, outside everything, and goes on in the next tick (unit:
+// elements listed). The last survey or step may exceed the bound by the work of one neighbourhood.
 inline constexpr std::uint32_t kMostSweepWork = 8192;
 
 // Moves at most `travel` from the feasible point `from` towards the minimum of (q − target)ᵀ A (q − target).
 // The way stays outside everything rigid and climbs over nothing but nearly flat edges. It ends when
 // first-order conditions hold, or at the bound on steps or work. Each step goes straight to the minimum over
-// the planes that separate nearby elements from the proxy (polygon::Neighbourhood), made lazily for the
-// elements in the way. Fills state.rigid_force_N.
+// planes that separate nearby elements from the proxy (polygon::Neighbourhood). Only elements that stand in
+// the way get such a plane. Fills state.rigid_force_N.
 Sweep sweep_proxy(const World& world, WorldState& state, const glm::dvec3& from, const glm::dvec3& target,
                   const glm::dmat3& metric, double travel) noexcept;
 

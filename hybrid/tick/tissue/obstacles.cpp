@@ -60,7 +60,8 @@ NearestRigid flip_if_inside(const World& world, const glm::dvec3& point, Nearest
 
 voxel::Obstacle obstacle_of(const SoftBody& body, const voxel::SoftObject& object, voxel::VoxelId v,
                             const NearestRigid& near) noexcept {
-  // n·(y + Δu − c) >= radius, with n·(y − c) = distance now.
+  // The voxel is a ball. If its displacement changes by Δu, its distance from the surface's plane, now
+  // near.distance, grows by n · Δu. It has to be at least the ball's radius.
   const glm::dvec3 n = glm::inverse(body.pose.rotation) * near.normal;
   const double bound = glm::dot(n, object.displacement(v)) + object.voxel_radius() - near.distance;
   return {glm::vec3(n), static_cast<float>(bound)};

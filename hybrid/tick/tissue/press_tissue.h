@@ -40,7 +40,7 @@ void refresh_map(const World& world, WorldState& state) noexcept;
 // For loops over surface voxels in turns: prefetches the displacement of a voxel whose turn comes soon.
 // Waiting for memory was half of the loop's time.
 inline void prefetch_surface(const voxel::SoftObject& object, std::uint32_t number) noexcept {
-  constexpr std::uint32_t kAhead = 16;
+  constexpr std::uint32_t kAhead = 16;  // voxels
   const auto surface = object.lattice().surface();
   if (number + kAhead >= surface.size()) return;
   for (const auto& axis : object.state().u) __builtin_prefetch(axis.data() + surface[number + kAhead]);

@@ -14,8 +14,9 @@ namespace hybrid {
 namespace {
 
 constexpr std::uint32_t kPairSlice = 256;  // surface voxels per tick for which a partner is looked up
-// A contact is made within kFindRange (touching distances), before the surfaces touch. So no voxel passes the
-// surface before its slice is searched. A contact is dropped beyond kDropRange (touching distances).
+// A contact is made before the surfaces touch, at a distance below kFindRange (unit: distance at which they
+// touch). Each tick searches only a slice of the surface, and no voxel may pass the other surface before its
+// slice is searched. A contact is dropped beyond kDropRange (same unit).
 constexpr double kFindRange = 1.5;
 constexpr double kDropRange = 1.75;
 // A contact begins to move its voxels at a gap below kHoldGap, and ends at a gap above kReleaseGap (touching
@@ -23,7 +24,7 @@ constexpr double kDropRange = 1.75;
 constexpr double kHoldGap = 0.1, kReleaseGap = 0.3;
 // A contact that is too far apart to press is queried once in this many ticks.
 constexpr std::size_t kFarContactTurns = 4;
-constexpr int kPairSweeps = 2;
+constexpr int kPairSweeps = 2;  // sweeps over all contacts in a tick
 // kAloneRounds: rounds in which an object that the tool does not press gives way alone. kAloneDepth: the
 // deepest overlap for which it does so (touching distances). Slow motion causes no deeper overlap.
 constexpr int kAloneRounds = 2;
@@ -203,8 +204,8 @@ void separate_pairs(const World& world, WorldState& state) noexcept {
   }
   const auto separate = [&](const auto& who) {
     bool any = false;
-    // Contacts that are too far apart to be held count too: the chain may have moved further voxels into
-    // overlap.
+    // Contacts whose voxels were too far apart to be moved are examined, too: the chain may have moved
+    // further voxels into overlap.
     for (const FacetContact& pair : state.facet_contacts) {
       any = visit_objects(world, state, pair.soft_pair,
                           [&](const auto& a, const auto& b) {

@@ -18,7 +18,7 @@ struct WorldState;
 
 class WorkShare {
  public:
-  static constexpr std::uint8_t kMostSteps = 6;
+  static constexpr std::uint8_t kMostSteps = 6;  // steps below the whole work; six are a factor of 0.35
 
   explicit WorkShare(double period_s) : limit_us_(kShareOfPeriod * 1e6 * period_s) {}
 
@@ -47,7 +47,7 @@ class WorkShare {
   static constexpr double kShareOfPeriod = 0.4;  // the rest is for the driver, and for ticks with more to do
   static constexpr double kFarBeyond = 1.5;      // unit: the limit; beyond this the share falls twice as fast
   static constexpr double kFastTick = 0.8;  // unit: the limit; below this one more step of work still fits
-  static constexpr int kFastTicks = 60;
+  static constexpr int kFastTicks = 60;     // fast ticks after which the share rises by a step
 
   double limit_us_;
   std::uint8_t steps_ = 0;

@@ -103,7 +103,8 @@ TEST(ChainMail, WhatCannotBeReachedGivesWayToAnchors) {
 }
 
 TEST(ChainMail, ASourceThatPullsTooFarEndsWhereTheChainEnds) {
-  // A column of nine links that may stretch by half: its free end follows by 4.5 spacings and no further.
+  // Ten voxels in a column along z, hence nine links. Voxel 0 is anchored. Each link may stretch by half a
+  // spacing. So the voxel at the other end can move by 9 · 0.5 = 4.5 spacings at most, wherever it is pulled.
   const double h = 1e-3;
   LatticeOptions options = tests::made_of({.stretch_min = 0.5, .stretch_max = 1.5, .shear = 0.25});
   const Lattice lattice(block({1, 1, 10}, glm::dvec3(h)), options);

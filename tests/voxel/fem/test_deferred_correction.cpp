@@ -281,8 +281,8 @@ TEST(BrickLoads, ABlockIsTheFiniteElements) {
   std::cout << "bricks in the store | " << rows << " rows, 2.5 and 5 mm | within " << 100 * worst << " %\n";
 }
 
-// A ball with a radius of 4 spacings. It acts through contact and its condensation, not through prescribed
-// displacements.
+// A ball with a radius of 4 spacings presses the block by contact, not by prescribed displacements. Its force
+// must be the slope of the energy.
 TEST(BrickLoads, TheToolFeelsTheSlopeOfItsEnergy) {
   for (const double poisson : {0.3, 0.45}) {
     const double h = 1e-3, radius = 4e-3;
