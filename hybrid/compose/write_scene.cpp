@@ -82,14 +82,13 @@ void add_placement(std::string& text, const Placement& p) {
 void add_materials(std::string& text, const MaterialNames& names) {
   if (names.all().empty()) return;
   text +=
-      "\n# Stiffness of tissue: Young's modulus and Poisson's ratio, with where they are from. Links between "
-      "voxels\n"
-      "# are right for ratios up to 0.3, and nested patches need one ratio in a volume. So all tissue has "
-      "0.3, "
-      "and the\n"
-      "# Young's modulus that keeps its contact modulus E/(1 - nu^2). `stretch` and `shear` bound how far a "
-      "link may give way; see "
-      "scenes/README.md.\n";
+      "\n# Stiffness of tissue: Young's modulus and Poisson's ratio, with where they are from. Where tissues "
+      "meet,\n"
+      "# links between voxels are right near a ratio of 0.3, and nested patches need one ratio in a volume. "
+      "So all\n"
+      "# tissue has 0.3, and the Young's modulus that keeps its contact modulus E/(1 - nu^2). `stretch` and "
+      "`shear`\n"
+      "# bound how far a link may give way; see scenes/README.md.\n";
   for (const auto& [name, t] : names.all()) {
     const LatticeStiffness links = as_six_links(*t);
     const std::string published = links.poisson == t->poisson
