@@ -19,8 +19,8 @@ constexpr float kRegular = 0.999F;
 // Stiffness along d with which the links of the fine level resist a correction of one coarse node, once it is
 // prolonged. A link counts by the squared difference of the interpolation weights at its ends, an anchor by
 // the interpolation weight of its node.
-CompositeGrid::ProlongedWeight CompositeGrid::prolonged_weight(const Level& fine, const Index3& node,
-                                                               std::size_t d) const noexcept {
+float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std::size_t d,
+                                      float stiffness) const noexcept {
   std::array<std::array<float, 5>, 3> along{};  // interpolation weights at −2 … 2 fine nodes
   std::array<std::size_t, 3> by{};
   for (std::size_t e = 0; e < 3; ++e) {
@@ -34,7 +34,7 @@ CompositeGrid::ProlongedWeight CompositeGrid::prolonged_weight(const Level& fine
                                        fine.nodes[2].fine[index(node[2])]);
   const auto& weight = shape_weights(fine)[d];
   const auto is_free = [&](std::size_t n) { return fine.inverse_diagonal[0][n] != 0.0F ? 1.0F : 0.0F; };
-  ProlongedWeight sum;
+  float sum = 0.0F;
   for (std::size_t q = 1; q <= 3; ++q) {
     for (std::size_t p = 1; p <= 3; ++p) {
       const float across = along[e][p] * along[f][q];
@@ -43,8 +43,8 @@ CompositeGrid::ProlongedWeight CompositeGrid::prolonged_weight(const Level& fine
       float before = 0.0F;
       for (std::size_t t = 0; t < 4; ++t, n += by[d]) {
         const float after = across * along[d][t + 1] * is_free(n + by[d]);
-        sum.links += weight[n] * (after - before) * (after - before);
-        sum.anchors += fine.anchor_weight[d][n + by[d]] * after;
+        sum += weight[n] * (after - before) * (after - before) +
+               fine.anchor_weight[d][n + by[d]] / stiffness * after;
         before = after;
       }
     }
@@ -67,16 +67,15 @@ void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) co
         if (coarse.inverse_diagonal[0][n] == 0.0F) continue;
         CorrectionSpring spring{static_cast<std::uint32_t>(n), {}};
         bool any = false;
+        // Links are compared by their tissue's shape, anchors by their weight over the tissue's stiffness.
+        const float stiffness = stiffness_at(coarse, n);
         for (std::size_t d = 0; d < 3; ++d) {
           const auto& weight = shape_weights(coarse)[d];
-          const float links = weight[n] + weight[n - coarse.stride_along(d)],
-                      anchors = coarse.anchor_weight[d][n];
-          const bool whole = links >= kRegular * static_cast<float>(2 * coarse.step);
-          if (whole && !material_.has_scattered_anchors()) continue;
-          const ProlongedWeight fine_weight = prolonged_weight(fine, {i, j, k}, d);
-          // Weights of links are by shape here, those of anchors include the stiffness of their tissue.
-          spring.weight[d] = stiffness_at(coarse, n) * std::max(fine_weight.links - links, 0.0F) +
-                             std::max(fine_weight.anchors - anchors, 0.0F);
+          const float own =
+              weight[n] + weight[n - coarse.stride_along(d)] + coarse.anchor_weight[d][n] / stiffness;
+          if (own >= kRegular * static_cast<float>(2 * coarse.step)) continue;
+          spring.weight[d] =
+              stiffness * std::max(prolonged_weight(fine, {i, j, k}, d, stiffness) - own, 0.0F);
           any = any || spring.weight[d] > 0.0F;
         }
         if (any && coarse.correction_springs.size() < coarse.correction_springs.capacity())

@@ -268,12 +268,8 @@ class CompositeGrid {
   void find_ghosts(Level& level, bool near) noexcept;
   void set_up_transfer(Level& fine, Level& coarse) const noexcept;
   void find_correction_springs(const Level& fine, Level& coarse) const noexcept;
-  // Of the fine level against a prolonged unit correction: of its links, and of its anchors.
-  struct ProlongedWeight {
-    float links = 0.0F, anchors = 0.0F;
-  };
-  [[nodiscard]] ProlongedWeight prolonged_weight(const Level& fine, const Index3& node,
-                                                 std::size_t d) const noexcept;
+  [[nodiscard]] float prolonged_weight(const Level& fine, const Index3& node, std::size_t d,
+                                       float stiffness) const noexcept;
   void fill_ghosts(const Level& level, float* values) const noexcept;
   void distribute_ghost_loads(const Level& level, float* loads) const noexcept;
   // ---- patch_stiffness.cpp ----
