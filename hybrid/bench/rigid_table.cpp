@@ -85,11 +85,13 @@ const Table<RigidRow>& rigid_table() {
       {{"triangles"}, 9, Side::right, [](const RigidRow& row) { return std::to_string(row.triangles); }},
       {{"ball"}, 5, Side::right, ball_text},
       {{"m/s"}, 6, Side::right, speed_text},
-      {{"engine"}, 9, Side::left, [](const RigidRow& row) { return std::string(engine_name(row.engine)); }},
+      {{"engine"}, 14, Side::left, [](const RigidRow& row) { return std::string(engine_name(row.engine)); }},
       {{"p50"}, 7, Side::right, time(&Percentiles::p50)},
       {{"p99"}, 7, Side::right, time(&Percentiles::p99)},
       {{"p99.9"}, 7, Side::right, time(&Percentiles::p999)},
       {{"max"}, 7, Side::right, time(&Percentiles::max)},
+      {{"slowest"}, 7, Side::right, [](const RigidRow& row) { return microseconds(row.slowest_us); }},
+      {{"trunc"}, 5, Side::right, [](const RigidRow& row) { return std::to_string(row.truncated_ticks); }},
       {{"mesh err"}, 8, Side::right, length(&Judgement::error_mesh_max)},
       {{"at"}, 6, Side::right, [](const RigidRow& row) { return std::to_string(row.judged.error_ticks); }},
       {{"sph max"}, 8, Side::right, length(&Judgement::error_sphere_max)},
@@ -126,6 +128,8 @@ Json to_json(const RigidRow& row) {
             {"p99_us", row.tick_us.p99},
             {"p999_us", row.tick_us.p999},
             {"max_us", row.tick_us.max},
+            {"slowest_us", row.slowest_us},
+            {"passes", row.passes},
             {"error_mesh_max_m", number(j.error_mesh_max)},
             {"error_sphere_max_m", number(j.error_sphere_max)},
             {"error_sphere_rms_m", number(j.error_sphere_rms)},
@@ -157,6 +161,7 @@ Json to_json(const RigidRow& row) {
   json["truncated_ticks"] = row.truncated_ticks;
   json["faults"] = row.faults;
   json["pose_us"] = row.pose_us ? hybrid::to_json(*row.pose_us) : Json(nullptr);
+  json["with_pose_us"] = row.with_pose_us ? hybrid::to_json(*row.with_pose_us) : Json(nullptr);
   json["surface_build_ms"] = row.surface_build_ms;
   json["map_build_ms"] = row.map_build_ms;
   return json;
@@ -171,43 +176,92 @@ std::string table_line(const RigidRow& row) {
   std::string note = place_text(row);
   if (row.ticks < row.path_ticks) note += fmt::format(" (first {} ticks)", row.ticks);
   if (j.lost_ticks > 0) note += fmt::format(" {} lost", j.lost_ticks);
-  if (row.truncated_ticks > 0) note += fmt::format(" {} truncated", row.truncated_ticks);
   if (!row.faults.empty()) note += fmt::format(" {} faults", row.faults.size());
   return rigid_table().line(row, note);
 }
 
-std::string ratio_table(const std::vector<RigidRow>& rows) {
-  const auto beside = [&](Engine engine, double Percentiles::*which, const RigidRow& row) {
+namespace {
+
+const Percentiles& touch_us(const RigidRow& row) {
+  return row.with_pose_us ? *row.with_pose_us : row.tick_us;
+}
+
+// The ratios of one engine to the product.
+class Ratios {
+ public:
+  Ratios(const std::vector<RigidRow>& rows, Engine engine, double Percentiles::*which)
+      : rows_(rows), engine_(engine), which_(which) {}
+
+  [[nodiscard]] std::optional<double> of(const RigidRow& own) const {
     const auto other = std::ranges::find_if(
-        rows, [&](const RigidRow& r) { return r.engine == engine && same_work(row, r); });
-    return other == rows.end() ? std::string("-")
-                               : fmt::format("{:.2f}", other->tick_us.*which / row.tick_us.*which);
+        rows_, [&](const RigidRow& r) { return r.engine == engine_ && same_work(own, r); });
+    if (other == rows_.end() || !(touch_us(own).*which_ > 0.0)) return std::nullopt;
+    return touch_us(*other).*which_ / (touch_us(own).*which_);
+  }
+  // The geometric mean over the rows of the product.
+  [[nodiscard]] std::optional<double> mean() const {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (const RigidRow& row : rows_) {
+      const std::optional<double> ratio = row.engine == Engine::hybrid ? of(row) : std::optional<double>();
+      if (!ratio || !(*ratio > 0.0)) continue;
+      sum += std::log(*ratio);
+      ++count;
+    }
+    if (count == 0) return std::nullopt;
+    return std::exp(sum / static_cast<double>(count));
+  }
+
+ private:
+  const std::vector<RigidRow>& rows_;
+  Engine engine_;
+  double Percentiles::*which_;
+};
+
+std::string ratio_text(const std::optional<double>& ratio) {
+  return ratio ? fmt::format("{:.2f}", *ratio) : std::string("-");
+}
+
+// A row without a path stands for the means.
+Table<RigidRow>::Column ratio_column(const std::string& title, const std::string& below, Ratios ratios) {
+  return {{title, below}, 8, Side::right, [ratios](const RigidRow& row) {
+            return ratio_text(row.path.empty() ? ratios.mean() : ratios.of(row));
+          }};
+}
+
+}  // namespace
+
+std::string ratio_table(const std::vector<RigidRow>& rows) {
+  const auto own_time = [](double Percentiles::*which) {
+    return [which](const RigidRow& row) {
+      return row.path.empty() ? std::string() : microseconds(touch_us(row).*which);
+    };
   };
-  const auto ratio = [&beside](Engine engine, double Percentiles::*which) {
-    return [&beside, engine, which](const RigidRow& row) { return beside(engine, which, row); };
+  const auto unless_means = [](auto cell) {
+    return [cell](const RigidRow& row) { return row.path.empty() ? std::string() : cell(row); };
   };
-  const bool any = std::ranges::any_of(rows, [&](const RigidRow& row) {
-    return row.engine == Engine::hybrid && (beside(Engine::cgal_aabb, &Percentiles::p50, row) != "-" ||
-                                            beside(Engine::no_map, &Percentiles::p50, row) != "-");
-  });
-  if (!any) return {};
-  const Table<RigidRow> table({
-      {{"path"}, 10, Side::left, [](const RigidRow& row) { return row.path; }},
+  std::vector<Table<RigidRow>::Column> columns{
+      {{"path"}, 10, Side::left, [](const RigidRow& row) { return row.path.empty() ? "mean" : row.path; }},
       {{"mesh"}, 9, Side::left, mesh_text},
-      {{"ball"}, 5, Side::right, ball_text},
-      {{"m/s"}, 6, Side::right, speed_text},
-      {{"p50 us"}, 9, Side::right, time(&Percentiles::p50)},
-      {{"p99 us"}, 9, Side::right, time(&Percentiles::p99)},
-      {{"cgal-aabb", "p50 x"}, 9, Side::right, ratio(Engine::cgal_aabb, &Percentiles::p50)},
-      {{"", "p99 x"}, 9, Side::right, ratio(Engine::cgal_aabb, &Percentiles::p99)},
-      {{"no-map", "p50 x"}, 9, Side::right, ratio(Engine::no_map, &Percentiles::p50)},
-      {{"", "p99 x"}, 9, Side::right, ratio(Engine::no_map, &Percentiles::p99)},
-  });
+      {{"ball"}, 5, Side::right, unless_means(ball_text)},
+      {{"m/s"}, 6, Side::right, unless_means(speed_text)},
+      {{"hybrid", "p50 us"}, 7, Side::right, own_time(&Percentiles::p50)},
+      {{"", "p99 us"}, 7, Side::right, own_time(&Percentiles::p99)}};
+  bool any = false;
+  for (const Engine engine : kEngines) {
+    const Ratios p50(rows, engine, &Percentiles::p50), p99(rows, engine, &Percentiles::p99);
+    if (engine == Engine::hybrid || !p50.mean()) continue;
+    any = true;
+    columns.push_back(ratio_column(engine_name(engine), "p50 x", p50));
+    columns.push_back(ratio_column("", "p99 x", p99));
+  }
+  if (!any) return {};
+  const Table<RigidRow> table(std::move(columns));
   std::string text = table.head();
   for (const RigidRow& row : rows) {
     if (row.engine == Engine::hybrid) text += table.line(row, place_text(row));
   }
-  return text;
+  return text + table.line(RigidRow());
 }
 
 }  // namespace hybrid::bench

@@ -403,7 +403,7 @@ TEST(BenchRigid, TicksThatEndBeforeTheProxyArrivesAreCounted) {
   RigidRow row;
   row.truncated_ticks = 3;
   EXPECT_EQ(to_json(row)["truncated_ticks"], 3);
-  EXPECT_NE(table_line(row).find("3 truncated"), std::string::npos);
+  EXPECT_NE(table_line(row).find(" 3 "), std::string::npos);
 }
 
 TEST(BenchRigid, WhatDoesNotFitTogetherIsRefused) {
