@@ -24,12 +24,12 @@ constexpr std::size_t kMostReferenceTriangles =
 constexpr std::size_t kLarge = 3'000'000;  // triangles: a shorter table
 constexpr double kSlowest_m_s = 0.02;      // of a scene of size 1: a lap of `moving` takes 19 s then
 
-// Seconds a baseline may spend in steps of one run, and what judging one run may take.
+// Seconds a baseline may spend in steps of one pass, and what judging one run may take.
 struct Budget {
   double cgal_s, no_map_s, other_s, judge_s, judge_baseline_s;
 };
-constexpr Budget kFull{1.5, 2.0, 3.0, 1.0, 0.2};
-constexpr Budget kQuick{0.1, 0.2, 0.2, 0.05, 0.02};
+constexpr Budget kFull{0.7, 0.7, 1.5, 1.0, 0.2};
+constexpr Budget kQuick{0.05, 0.1, 0.1, 0.05, 0.02};
 
 // Paths are made in a scene of size 1, and scaled. A mesh of a file keeps its size: the scale fits the paths
 // to it, and tool and speed are what they are in the scene.
@@ -285,8 +285,8 @@ class Workshop {
                  .offset_m = glm::dvec3(c.offset_m),
                  .engine = run.engine,
                  .tick_us = {},
+                 .least_us = {},
                  .pose_us = {},
-                 .with_pose_us = {},
                  .faults = fault_texts(world.state().faults),
                  .judged = {}};
     row.ticks = run.ticks - std::min<std::size_t>(run.ticks, path.counted_from);
@@ -297,14 +297,8 @@ class Workshop {
       return percentiles(values);
     };
     row.tick_us = of_counted(run.tick_us);
-    if (!run.pose_us.empty()) {
-      row.pose_us = of_counted(run.pose_us);
-      std::vector<float> both = run.tick_us;
-      for (std::size_t k = 0; k < both.size(); ++k) both[k] += run.pose_us[k];
-      row.with_pose_us = of_counted(both);
-    }
-    row.slowest_us = of_counted(run.least_us).max;
-    row.passes = run.passes;
+    if (!run.pose_us.empty()) row.pose_us = of_counted(run.pose_us);
+    row.least_us = of_counted(run.least_us);
     row.timer_overhead_us = timer.overhead_us();
     const auto all = static_cast<double>(std::max<std::size_t>(1, run.ticks));
     row.steps_mean = static_cast<double>(run.steps) / all;

@@ -212,43 +212,25 @@ bool TouchWorld::would_go_on(const glm::dvec3& proxy_m, const glm::dvec3& goal_m
 
 namespace {
 
-// All engines whose `runs` have no tick yet go once along the path.
-void run_pass(const GoalPath& path, std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
-              const glm::dvec3& offset_m, const TickTimer& timer, std::vector<TouchRun>& runs) {
+// One pass: all engines once along the path, engine e at most `most[e]` ticks.
+std::vector<TouchRun> run_pass(const GoalPath& path, std::span<const std::size_t> most,
+                               std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
+                               const glm::dvec3& offset_m, const TickTimer& timer) {
+  std::vector<TouchRun> runs(worlds.size());
+  for (TouchRun& run : runs) prepare(run, path);
   for (std::size_t first = 0, turn = 0; first < path.goals.size(); first += kBlock, ++turn) {
-    const std::size_t last = std::min(first + kBlock, path.goals.size());
     for (std::size_t i = 0; i < runs.size(); ++i) {
       const std::size_t e = (i + turn) % runs.size();
       if (runs[e].ticks == first)
-        run_block(path, first, last, *worlds[e], limit_s[e], offset_m, timer, runs[e]);
+        run_block(path, first, std::min(first + kBlock, most[e]), *worlds[e], limit_s[e], offset_m, timer,
+                  runs[e]);
     }
   }
+  return runs;
 }
 
-void keep_least(const TouchRun& pass, TouchRun& run) {
-  if (run.passes == 0) run.least_us = pass.tick_us;
-  for (std::size_t k = 0; k < pass.ticks; ++k) run.least_us[k] = std::min(run.least_us[k], pass.tick_us[k]);
-  ++run.passes;
-}
-
-// Further passes of the engines that have time for all.
-void run_again(const GoalPath& path, std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
-               const glm::dvec3& offset_m, const TickTimer& timer, std::vector<TouchRun>& runs) {
-  for (std::size_t n = 1; n < kPasses; ++n) {
-    std::vector<TouchRun> again(runs.size());
-    for (std::size_t e = 0; e < runs.size(); ++e) {
-      const bool has_time = limit_s[e] <= 0.0 || runs[e].spent_s * kPasses <= limit_s[e];
-      if (has_time && runs[e].ticks == path.goals.size()) {
-        prepare(again[e], path);
-      } else {
-        again[e].ticks = path.goals.size();  // nothing is left to do
-      }
-    }
-    run_pass(path, worlds, limit_s, offset_m, timer, again);
-    for (std::size_t e = 0; e < runs.size(); ++e) {
-      if (!again[e].tick_us.empty()) keep_least(again[e], runs[e]);
-    }
-  }
+float touch_us(const TouchRun& run, std::size_t tick) {
+  return run.tick_us[tick] + (run.pose_us.empty() ? 0.0F : run.pose_us[tick]);
 }
 
 // The published proxy says nothing of the places where it would go on, so a further pass is tried from each.
@@ -265,14 +247,21 @@ void count_unsettled(const GoalPath& path, const TouchWorld& world, const glm::d
 std::vector<TouchRun> run_engines(const GoalPath& path, std::span<const Engine> engines,
                                   std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
                                   const glm::dvec3& offset_m, const TickTimer& timer) {
-  std::vector<TouchRun> runs(engines.size());
+  std::vector<std::size_t> most(engines.size(), path.goals.size());
+  std::vector<TouchRun> runs = run_pass(path, most, worlds, limit_s, offset_m, timer);
   for (std::size_t e = 0; e < engines.size(); ++e) {
     runs[e].engine = engines[e];
-    prepare(runs[e], path);
+    most[e] = runs[e].ticks;
+    for (std::size_t k = 0; k < most[e]; ++k) runs[e].least_us.push_back(touch_us(runs[e], k));
   }
-  run_pass(path, worlds, limit_s, offset_m, timer, runs);
-  for (TouchRun& run : runs) keep_least(run, run);
-  run_again(path, worlds, limit_s, offset_m, timer, runs);
+  const std::vector<double> no_limit(engines.size(), 0.0);
+  for (std::size_t n = 1; n < kPasses; ++n) {
+    const std::vector<TouchRun> again = run_pass(path, most, worlds, no_limit, offset_m, timer);
+    for (std::size_t e = 0; e < engines.size(); ++e) {
+      for (std::size_t k = 0; k < most[e]; ++k)
+        runs[e].least_us[k] = std::min(runs[e].least_us[k], touch_us(again[e], k));
+    }
+  }
   for (std::size_t e = 0; e < engines.size(); ++e) {
     if (is_finger(engines[e])) count_unsettled(path, *worlds[e], offset_m, runs[e]);
   }

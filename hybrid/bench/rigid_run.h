@@ -94,18 +94,16 @@ struct TouchRun {
   std::uint32_t most_steps = 0;
   std::uint64_t truncated_ticks = 0;  // counted ticks that a bound on the steps ended before the minimum
   double spent_s = 0.0;
-  // Each tick's least time over all passes. Every pass does the same work, so time that a pass adds to a tick
-  // is the machine's and not the engine's.
+  // Each tick's least time over kPasses passes, with that of moving the body. Every pass does the same work,
+  // so time that one pass adds to a tick is the machine's and not the engine's.
   std::vector<float> least_us;
-  std::size_t passes = 0;
 };
 
-inline constexpr std::size_t kPasses = 3;  // over each path; all figures but least_us are of the first
+inline constexpr std::size_t kPasses = 3;  // over each path; all but least_us is of the first
 
 // Runs all worlds along the path, each in turn for a block of ticks, so that whatever else the machine does
-// meets all alike. A world whose engine has spent `limit_s` (0: no limit) in steps is stopped there, and an
-// engine that would exceed the limit in kPasses passes makes one. `path` is in the scene frame; its goals and
-// bodies are used as they stand.
+// meets all alike. A world whose engine has spent `limit_s` (0: no limit) in steps is stopped there, in each
+// pass at the same tick. `path` is in the scene frame; its goals and bodies are used as they stand.
 std::vector<TouchRun> run_engines(const GoalPath& path, std::span<const Engine> engines,
                                   std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
                                   const glm::dvec3& offset_m, const TickTimer& timer);

@@ -90,7 +90,7 @@ const Table<RigidRow>& rigid_table() {
       {{"p99"}, 7, Side::right, time(&Percentiles::p99)},
       {{"p99.9"}, 7, Side::right, time(&Percentiles::p999)},
       {{"max"}, 7, Side::right, time(&Percentiles::max)},
-      {{"slowest"}, 7, Side::right, [](const RigidRow& row) { return microseconds(row.slowest_us); }},
+      {{"slowest"}, 7, Side::right, [](const RigidRow& row) { return microseconds(row.least_us.max); }},
       {{"trunc"}, 5, Side::right, [](const RigidRow& row) { return std::to_string(row.truncated_ticks); }},
       {{"mesh err"}, 8, Side::right, length(&Judgement::error_mesh_max)},
       {{"at"}, 6, Side::right, [](const RigidRow& row) { return std::to_string(row.judged.error_ticks); }},
@@ -128,8 +128,6 @@ Json to_json(const RigidRow& row) {
             {"p99_us", row.tick_us.p99},
             {"p999_us", row.tick_us.p999},
             {"max_us", row.tick_us.max},
-            {"slowest_us", row.slowest_us},
-            {"passes", row.passes},
             {"error_mesh_max_m", number(j.error_mesh_max)},
             {"error_sphere_max_m", number(j.error_sphere_max)},
             {"error_sphere_rms_m", number(j.error_sphere_rms)},
@@ -161,7 +159,7 @@ Json to_json(const RigidRow& row) {
   json["truncated_ticks"] = row.truncated_ticks;
   json["faults"] = row.faults;
   json["pose_us"] = row.pose_us ? hybrid::to_json(*row.pose_us) : Json(nullptr);
-  json["with_pose_us"] = row.with_pose_us ? hybrid::to_json(*row.with_pose_us) : Json(nullptr);
+  json["least_us"] = hybrid::to_json(row.least_us);
   json["surface_build_ms"] = row.surface_build_ms;
   json["map_build_ms"] = row.map_build_ms;
   return json;
@@ -182,10 +180,6 @@ std::string table_line(const RigidRow& row) {
 
 namespace {
 
-const Percentiles& touch_us(const RigidRow& row) {
-  return row.with_pose_us ? *row.with_pose_us : row.tick_us;
-}
-
 // The ratios of one engine to the product.
 class Ratios {
  public:
@@ -195,8 +189,8 @@ class Ratios {
   [[nodiscard]] std::optional<double> of(const RigidRow& own) const {
     const auto other = std::ranges::find_if(
         rows_, [&](const RigidRow& r) { return r.engine == engine_ && same_work(own, r); });
-    if (other == rows_.end() || !(touch_us(own).*which_ > 0.0)) return std::nullopt;
-    return touch_us(*other).*which_ / (touch_us(own).*which_);
+    if (other == rows_.end() || !(own.least_us.*which_ > 0.0)) return std::nullopt;
+    return other->least_us.*which_ / (own.least_us.*which_);
   }
   // The geometric mean over the rows of the product.
   [[nodiscard]] std::optional<double> mean() const {
@@ -234,7 +228,7 @@ Table<RigidRow>::Column ratio_column(const std::string& title, const std::string
 std::string ratio_table(const std::vector<RigidRow>& rows) {
   const auto own_time = [](double Percentiles::*which) {
     return [which](const RigidRow& row) {
-      return row.path.empty() ? std::string() : microseconds(touch_us(row).*which);
+      return row.path.empty() ? std::string() : microseconds(row.least_us.*which);
     };
   };
   const auto unless_means = [](auto cell) {

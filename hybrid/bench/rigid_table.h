@@ -19,10 +19,9 @@ struct RigidRow {
   Engine engine = Engine::hybrid;
   std::size_t ticks = 0, path_ticks = 0;  // measured, and of the whole path
   Percentiles tick_us;
-  std::optional<Percentiles> pose_us;       // moving the body
-  std::optional<Percentiles> with_pose_us;  // moving the body and the step, tick by tick
-  double slowest_us = 0.0;                  // the slowest tick, of each tick's least time in `passes` passes
-  std::size_t passes = 0;
+  // Of each tick's least time in kPasses passes, with that of moving the body (TouchRun::least_us).
+  Percentiles least_us;
+  std::optional<Percentiles> pose_us;  // moving the body
   double timer_overhead_us = 0.0;
   double steps_mean = 0.0, surveys_per_tick = 0.0;
   std::uint32_t steps_max = 0;
@@ -37,8 +36,8 @@ nlohmann::ordered_json to_json(const RigidRow& row);
 
 std::string table_head();
 std::string table_line(const RigidRow& row);
-// The same path and mesh through each engine: p50 and p99 of the product, and how many times as long the
-// others take, with the geometric means of these ratios. Where the body moves, moving it counts.
+// The same path and mesh through each engine: p50 and p99 of the product's least times, and how many times as
+// long the others take, with the geometric means of these ratios. Where the body moves, moving it counts.
 std::string ratio_table(const std::vector<RigidRow>& rows);
 
 }  // namespace hybrid::bench

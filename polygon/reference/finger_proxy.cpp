@@ -78,21 +78,31 @@ class Constraints {
   double slack_m_;
 };
 
+// Moves `at` towards `next` until it is within the gap of a triangle. Looks ahead by the gap, or a goal on a
+// triangle would put the proxy there. Returns the contact, if there is one.
+SweptHit advance(const TriangleTree& tree, double radius, double gap, const glm::dvec3& next,
+                 glm::dvec3& at) {
+  const glm::dvec3 way = next - at;
+  const double reach = 1.0 + gap / std::max(gap, glm::length(way));
+  SweptHit hit = tree.first_hit(at, at + reach * way, radius);
+  if (hit.hit) {
+    const double part = reach * hit.part + gap / glm::dot(hit.normal, way);  // the product is negative
+    hit.hit = part < 1.0;
+    if (hit.hit) at += std::max(0.0, part) * way;
+  }
+  if (!hit.hit) at = next;
+  return hit;
+}
+
 // The proxy goes on from `at`. True: nothing was in the way to the goal.
 bool pass(const TriangleTree& tree, double radius, double gap, const glm::dvec3& goal, glm::dvec3& at,
           std::uint32_t& sweeps) {
   Constraints constraints(kSlack * gap);
   glm::dvec3 next = goal;
   for (;;) {
-    const SweptHit hit = tree.first_hit(at, next, radius);
+    const SweptHit hit = advance(tree, radius, gap, next, at);
     ++sweeps;
-    if (!hit.hit) {
-      at = next;
-      return sweeps == 1;
-    }
-    const glm::dvec3 way = next - at;
-    const double approach = -glm::dot(hit.normal, way);  // > 0 by the meaning of a hit
-    at += std::max(0.0, hit.part - gap / approach) * way;
+    if (!hit.hit) return sweeps == 1;
     if (constraints.full()) return false;
     constraints.add(hit.normal, at);
     next = constraints.nearest(goal, at);

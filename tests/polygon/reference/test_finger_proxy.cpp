@@ -222,6 +222,15 @@ TEST(FingerProxy, OffAFaceItGoesRoundTheEdge) {
   }
 }
 
+// A proxy that came to lie on the face itself would meet the rim of the next face, as in a concave edge.
+TEST(FingerProxy, AGoalOnTheFaceItselfKeepsTheGap) {
+  const TriangleTree tree(box_mesh());
+  dvec3 proxy(0.04, 0.0, 0.06);
+  for (const dvec3& goal : {dvec3(0.04, 0.0, kHalf_m), dvec3(0.049, 0.0, 0.045), dvec3(0.051, 0.0, 0.045)})
+    proxy = settle(tree, 0.0, proxy, goal).point;
+  EXPECT_EQ(proxy, dvec3(0.051, 0.0, 0.045));
+}
+
 TEST(FingerProxy, WhereverTheGoalJumpsNoTriangleIsEntered) {
   const TriangleMesh mesh = box_mesh();
   const TriangleTree tree(mesh);
