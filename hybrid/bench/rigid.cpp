@@ -28,8 +28,8 @@ constexpr double kSlowest_m_s = 0.02;      // of a scene of size 1: a lap of `mo
 struct Budget {
   double cgal_s, no_map_s, other_s, judge_s, judge_baseline_s;
 };
-constexpr Budget kFull{0.7, 0.7, 1.5, 1.0, 0.2};
-constexpr Budget kQuick{0.05, 0.1, 0.1, 0.05, 0.02};
+constexpr Budget kFull{0.7, 0.7, 8.0, 1.0, 0.2};
+constexpr Budget kQuick{0.05, 0.1, 1.0, 0.05, 0.02};
 
 // Paths are made in a scene of size 1, and scaled. A mesh of a file keeps its size: the scale fits the paths
 // to it, and tool and speed are what they are in the scene.

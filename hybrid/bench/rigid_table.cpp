@@ -180,40 +180,52 @@ std::string table_line(const RigidRow& row) {
 
 namespace {
 
+struct Ratio {
+  double value = 0.0;
+  bool whole = true;  // false: the other engine was stopped before the end of the path
+};
+
 // The ratios of one engine to the product.
 class Ratios {
  public:
   Ratios(const std::vector<RigidRow>& rows, Engine engine, double Percentiles::*which)
       : rows_(rows), engine_(engine), which_(which) {}
 
-  [[nodiscard]] std::optional<double> of(const RigidRow& own) const {
+  [[nodiscard]] std::optional<Ratio> of(const RigidRow& own) const {
     const auto other = std::ranges::find_if(
         rows_, [&](const RigidRow& r) { return r.engine == engine_ && same_work(own, r); });
     if (other == rows_.end() || !(own.least_us.*which_ > 0.0)) return std::nullopt;
-    return other->least_us.*which_ / (own.least_us.*which_);
+    return Ratio{other->least_us.*which_ / (own.least_us.*which_), other->ticks >= own.ticks};
   }
-  // The geometric mean over the rows of the product.
-  [[nodiscard]] std::optional<double> mean() const {
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (const RigidRow& row : rows_) {
-      const std::optional<double> ratio = row.engine == Engine::hybrid ? of(row) : std::optional<double>();
-      if (!ratio || !(*ratio > 0.0)) continue;
-      sum += std::log(*ratio);
-      ++count;
-    }
-    if (count == 0) return std::nullopt;
-    return std::exp(sum / static_cast<double>(count));
+  // The geometric mean over the rows of the product, without partial ones unless there are no others.
+  [[nodiscard]] std::optional<Ratio> mean() const {
+    const std::optional<Ratio> whole = mean_of(true);
+    return whole ? whole : mean_of(false);
   }
 
  private:
+  [[nodiscard]] std::optional<Ratio> mean_of(bool whole) const {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (const RigidRow& row : rows_) {
+      if (row.engine != Engine::hybrid) continue;
+      const std::optional<Ratio> ratio = of(row);
+      if (!ratio || ratio->whole != whole || !(ratio->value > 0.0)) continue;
+      sum += std::log(ratio->value);
+      ++count;
+    }
+    if (count == 0) return std::nullopt;
+    return Ratio{std::exp(sum / static_cast<double>(count)), whole};
+  }
+
   const std::vector<RigidRow>& rows_;
   Engine engine_;
   double Percentiles::*which_;
 };
 
-std::string ratio_text(const std::optional<double>& ratio) {
-  return ratio ? fmt::format("{:.2f}", *ratio) : std::string("-");
+std::string ratio_text(const std::optional<Ratio>& ratio) {
+  if (!ratio) return "-";
+  return fmt::format("{:.2f}{}", ratio->value, ratio->whole ? "" : "*");
 }
 
 // A row without a path stands for the means.

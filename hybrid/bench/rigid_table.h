@@ -37,7 +37,9 @@ nlohmann::ordered_json to_json(const RigidRow& row);
 std::string table_head();
 std::string table_line(const RigidRow& row);
 // The same path and mesh through each engine: p50 and p99 of the product's least times, and how many times as
-// long the others take, with the geometric means of these ratios. Where the body moves, moving it counts.
+// long the others take, with the geometric means of these ratios. Where the body moves, moving it counts. A
+// star marks an engine that was stopped before the end of the path: its ticks are others, and the mean leaves
+// it out.
 std::string ratio_table(const std::vector<RigidRow>& rows);
 
 }  // namespace hybrid::bench

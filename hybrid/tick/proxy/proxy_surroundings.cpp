@@ -77,7 +77,7 @@ bool ProxySurroundings::survey_from(const glm::dvec3& point) noexcept {
 }
 
 // The bits of the objects within look_m of the viewpoint. An element that holds the proxy answers for the
-// only object of a scene at a hundredth of the time of a query, and the map would say the same.
+// only object of a scene without a query, and the map would say the same.
 std::uint64_t ProxySurroundings::near_objects() noexcept {
   if (world_.rigid.size() == 1 && state_.active_count > 0) {
     const glm::dvec3 view = state_.rigid[0].frame.to_body(point_);

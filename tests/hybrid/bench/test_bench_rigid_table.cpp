@@ -35,7 +35,13 @@ TEST(BenchRigidTable, ItEndsWithTheGeometricMeansOfTheRatiosOfLeastTimes) {
     const double us = i % 2 == 0 ? 1.0 : i == 1 ? 2.0 : 8.0;
     rows[i].least_us = {.p50 = us, .p99 = us, .p999 = us, .max = us};
   }
+  // A third ratio, of an engine that was stopped early, is marked and not in the mean.
+  rows.insert(rows.end(), {rows[0], rows[1]});
+  rows[4].path = rows[5].path = "moving";
+  rows[4].ticks = 10;
+  rows[5].ticks = 9;
   const std::string ratios = ratio_table(rows);
+  EXPECT_NE(ratios.find("   2.00*    2.00*\n"), std::string::npos) << ratios;
   EXPECT_NE(ratios.find("    2.00     2.00\n"), std::string::npos) << ratios;
   EXPECT_NE(ratios.find("    8.00     8.00\n"), std::string::npos) << ratios;
   EXPECT_EQ(ratios.substr(ratios.rfind("mean")).find("4.00     4.00"),
