@@ -24,12 +24,12 @@ constexpr std::size_t kMostReferenceTriangles =
 constexpr std::size_t kLarge = 3'000'000;  // triangles: a shorter table
 constexpr double kSlowest_m_s = 0.02;      // of a scene of size 1: a lap of `moving` takes 19 s then
 
-// Seconds a baseline may spend in steps of one run, and what judging one run may take.
+// Seconds a baseline may spend in steps of one pass, and what judging one run may take.
 struct Budget {
-  double cgal_s, no_map_s, judge_s, judge_baseline_s;
+  double cgal_s, no_map_s, other_s, judge_s, judge_baseline_s;
 };
-constexpr Budget kFull{1.5, 2.0, 1.0, 0.2};  // s, in the order of Budget's members
-constexpr Budget kQuick{0.1, 0.2, 0.05, 0.02};
+constexpr Budget kFull{0.7, 0.7, 8.0, 1.0, 0.2};  // s, in the order of Budget's members
+constexpr Budget kQuick{0.05, 0.1, 1.0, 0.05, 0.02};
 
 // Paths are made in a scene of size 1, and scaled. A mesh of a file keeps its size: the scale fits the paths
 // to it, and tool and speed are what they are in the scene.
@@ -80,13 +80,7 @@ class Plan {
         case BenchShape::from_file:
           break;
       }
-      if (bench_mesh_shape(mesh) != BenchShape::corner && (chosen || mesh == "ico5" || mesh == "cube1")) {
-        if (options.quick) {
-          add("moving", mesh, {0.1});
-        } else {
-          add("moving", mesh, {0.02, 0.1, 1.0});
-        }
-      }
+      if (bench_mesh_shape(mesh) != BenchShape::corner) add("moving", mesh, moving_speeds(mesh, chosen));
       if (!options.quick) add_elsewhere(mesh);
     }
   }
@@ -124,6 +118,12 @@ class Plan {
     add_path("slide", options_.quick ? Speeds{0.1} : Speeds{0.1, 1.0});
     add_path("tap", {2.0 * scale});  // a path of 41 ticks, whatever the size
     add_path("moving", options_.quick ? Speeds{0.1} : Speeds{0.02, 0.1, 1.0});
+  }
+
+  [[nodiscard]] std::vector<double> moving_speeds(const std::string& mesh, bool chosen) const {
+    if (options_.quick) return {0.1};
+    if (chosen || mesh == "ico5" || mesh == "cube1") return {0.02, 0.1, 1.0};
+    return {1.0};
   }
 
   void add_sphere(const std::string& mesh) {
@@ -206,8 +206,8 @@ class Workshop {
       reference_ = std::make_unique<polygon::OptimalityReference>(mesh_.mesh);
     }
     for (const Engine engine : kEngines) {
-      const bool too_large =
-          engine == Engine::cgal_aabb && mesh_.mesh.triangles.size() > kMostBaselineTriangles;
+      const bool too_large = engine != Engine::hybrid && engine != Engine::no_map &&
+                             mesh_.mesh.triangles.size() > kMostBaselineTriangles;
       if (options.engines.empty() ? too_large
                                   : std::count(options.engines.begin(), options.engines.end(), engine) == 0)
         continue;
@@ -232,7 +232,8 @@ class Workshop {
       worlds.push_back(&world);
       limits.push_back(engine == Engine::hybrid      ? 0.0
                        : engine == Engine::cgal_aabb ? budget.cgal_s
-                                                     : budget.no_map_s);
+                       : engine == Engine::no_map    ? budget.no_map_s
+                                                     : budget.other_s);
     }
     const std::vector<TouchRun> runs = run_engines(path, engines_, worlds, limits, offset, timer);
     Judge judge(mesh_, path, offset, radius, c.scale, reference_.get());
@@ -255,8 +256,8 @@ class Workshop {
   }
 
   const TimedSurface& surface_of(Engine engine) {
-    TimedSurface& surface = engine == Engine::cgal_aabb ? cgal_ : own_;
-    if (!surface.surface) {
+    TimedSurface& surface = engine == Engine::cgal_aabb ? cgal_ : is_finger(engine) ? finger_ : own_;
+    if (!surface.surface && !surface.tree) {
       say(engine == Engine::cgal_aabb ? "building CGAL's tree" : "building the surface");
       surface = make_surface(mesh_, engine);
     }
@@ -284,6 +285,7 @@ class Workshop {
                  .offset_m = glm::dvec3(c.offset_m),
                  .engine = run.engine,
                  .tick_us = {},
+                 .least_us = {},
                  .pose_us = {},
                  .faults = fault_texts(world.state().faults),
                  .judged = {}};
@@ -296,6 +298,7 @@ class Workshop {
     };
     row.tick_us = of_counted(run.tick_us);
     if (!run.pose_us.empty()) row.pose_us = of_counted(run.pose_us);
+    row.least_us = of_counted(run.least_us);
     row.timer_overhead_us = timer.overhead_us();
     const auto all = static_cast<double>(std::max<std::size_t>(1, run.ticks));
     row.steps_mean = static_cast<double>(run.steps) / all;
@@ -338,7 +341,7 @@ class Workshop {
   const BenchMesh& mesh_;
   std::vector<Engine> engines_;
   std::unique_ptr<polygon::OptimalityReference> reference_;
-  TimedSurface own_, cgal_;
+  TimedSurface own_, cgal_, finger_;
   std::map<std::tuple<Engine, double, double, bool>, std::unique_ptr<TouchWorld>> worlds_;
 };
 

@@ -23,7 +23,7 @@ struct RigidBenchOptions {
   // Empty: those of the default table; else exactly these, by name or by file, see meshes.h.
   std::vector<std::string> meshes;
   double mesh_unit_m = 1e-3;    // of files
-  std::vector<Engine> engines;  // empty: all, but CGAL's tree only up to kMostBaselineTriangles
+  std::vector<Engine> engines;  // empty: all, above kMostBaselineTriangles only hybrid and no_map
   std::filesystem::path trace;  // folder for one CSV a run; empty: none
   Progress progress;
   std::function<void(const std::string&)> on_note;  // defects of a file's mesh

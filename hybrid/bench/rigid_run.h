@@ -13,21 +13,33 @@
 #include "hybrid/bench/meshes.h"
 #include "hybrid/bench/paths.h"
 #include "hybrid/bench/timer.h"
+#include "hybrid/tick/proxy/proxy_step.h"
 #include "hybrid/world/world_state.h"
+#include "polygon/reference/finger_proxy.h"
 
 namespace hybrid::bench {
 
-// What answers the proxy: the product; the product with CGAL's AABB tree in place of its own queries; the
-// product without the occupancy map.
-enum class Engine : std::uint8_t { hybrid, cgal_aabb, no_map };
-inline constexpr std::array kEngines{Engine::hybrid, Engine::cgal_aabb, Engine::no_map};
+enum class Engine : std::uint8_t {
+  hybrid,          // the product: the rigid part of its tick
+  cgal_aabb,       // the product with CGAL's AABB tree in place of its own queries
+  no_map,          // the product without the occupancy map
+  finger_proxy,    // the published proxy with constraint planes (polygon/reference/finger_proxy.h)
+  finger_settled,  // the same, repeated within the tick until it stands
+  whole_tick,      // the product: all of haptic_tick()
+};
+inline constexpr std::array kEngines{Engine::hybrid,       Engine::cgal_aabb,      Engine::no_map,
+                                     Engine::finger_proxy, Engine::finger_settled, Engine::whole_tick};
 const char* engine_name(Engine engine);
+inline bool is_finger(Engine engine) {
+  return engine == Engine::finger_proxy || engine == Engine::finger_settled;
+}
 
 inline constexpr double kStiffness_N_per_m = 1000.0;  // of the coupling
 
 // A surface and what it took to build it; shared by all runs on the mesh.
 struct TimedSurface {
-  std::shared_ptr<const polygon::RigidSurface> surface;
+  std::shared_ptr<const polygon::RigidSurface> surface;  // null for the published proxy, which has a tree
+  std::shared_ptr<const polygon::TriangleTree> tree{};
   double build_ms = 0.0;
 };
 TimedSurface make_surface(const BenchMesh& mesh, Engine engine);
@@ -49,12 +61,26 @@ class TouchWorld {
   // the place is not free.
   void start(const glm::dvec3& goal_m, const glm::dvec3& body_m);
   void move_body(const glm::dvec3& body_m);  // from one tick to the next
+  RigidStep step(const glm::dvec3& goal_m) noexcept;
+  // Whether a proxy at `proxy_m` would go on if it were given another tick; of the published proxy alone.
+  [[nodiscard]] bool would_go_on(const glm::dvec3& proxy_m, const glm::dvec3& goal_m,
+                                 const glm::dvec3& body_m) const;
 
  private:
+  void fill_world(const BenchMesh& mesh, const TimedSurface& surface, double tool_radius_m,
+                  const glm::dvec3& offset_m);
+  RigidStep step_finger(const glm::dvec3& goal_m) noexcept;
+  RigidStep step_whole(const glm::dvec3& goal_m) noexcept;
+
+  Engine engine_;
   World world_;
   std::unique_ptr<WorldState> state_;
   bool moves_ = false;
   double build_ms_ = 0.0, map_ms_ = 0.0;
+  // Of the published proxy. A body carries it along, because its place is in the body's frame.
+  std::shared_ptr<const polygon::TriangleTree> tree_;
+  polygon::FingerOptions finger_;
+  glm::dvec3 proxy_in_body_{0.0}, body_m_{0.0};
 };
 
 // One engine's way along a path, one entry a tick in every vector.
@@ -68,11 +94,16 @@ struct TouchRun {
   std::uint32_t most_steps = 0;
   std::uint64_t truncated_ticks = 0;  // counted ticks that a bound on the steps ended before the minimum
   double spent_s = 0.0;
+  // Each tick's least time over kPasses passes, with that of moving the body. Every pass does the same work,
+  // so time that one pass adds to a tick is the machine's and not the engine's.
+  std::vector<float> least_us;
 };
 
+inline constexpr std::size_t kPasses = 3;  // over each path; all but least_us is of the first
+
 // Runs all worlds along the path, each in turn for a block of ticks, so that whatever else the machine does
-// meets all alike. A world whose engine has spent `limit_s` (0: no limit) in steps is stopped there.
-// `path` is in the scene frame; its goals and bodies are used as they stand.
+// meets all alike. A world whose engine has spent `limit_s` (0: no limit) in steps is stopped there, in each
+// pass at the same tick. `path` is in the scene frame; its goals and bodies are used as they stand.
 std::vector<TouchRun> run_engines(const GoalPath& path, std::span<const Engine> engines,
                                   std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
                                   const glm::dvec3& offset_m, const TickTimer& timer);

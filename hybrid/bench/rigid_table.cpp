@@ -85,11 +85,13 @@ const Table<RigidRow>& rigid_table() {
       {{"triangles"}, 9, Side::right, [](const RigidRow& row) { return std::to_string(row.triangles); }},
       {{"ball"}, 5, Side::right, ball_text},
       {{"m/s"}, 6, Side::right, speed_text},
-      {{"engine"}, 9, Side::left, [](const RigidRow& row) { return std::string(engine_name(row.engine)); }},
+      {{"engine"}, 14, Side::left, [](const RigidRow& row) { return std::string(engine_name(row.engine)); }},
       {{"p50"}, 7, Side::right, time(&Percentiles::p50)},
       {{"p99"}, 7, Side::right, time(&Percentiles::p99)},
       {{"p99.9"}, 7, Side::right, time(&Percentiles::p999)},
       {{"max"}, 7, Side::right, time(&Percentiles::max)},
+      {{"slowest"}, 7, Side::right, [](const RigidRow& row) { return microseconds(row.least_us.max); }},
+      {{"trunc"}, 5, Side::right, [](const RigidRow& row) { return std::to_string(row.truncated_ticks); }},
       {{"mesh err"}, 8, Side::right, length(&Judgement::error_mesh_max)},
       {{"at"}, 6, Side::right, [](const RigidRow& row) { return std::to_string(row.judged.error_ticks); }},
       {{"sph max"}, 8, Side::right, length(&Judgement::error_sphere_max)},
@@ -157,6 +159,7 @@ Json to_json(const RigidRow& row) {
   json["truncated_ticks"] = row.truncated_ticks;
   json["faults"] = row.faults;
   json["pose_us"] = row.pose_us ? hybrid::to_json(*row.pose_us) : Json(nullptr);
+  json["least_us"] = hybrid::to_json(row.least_us);
   json["surface_build_ms"] = row.surface_build_ms;
   json["map_build_ms"] = row.map_build_ms;
   return json;
@@ -171,43 +174,100 @@ std::string table_line(const RigidRow& row) {
   std::string note = place_text(row);
   if (row.ticks < row.path_ticks) note += fmt::format(" (first {} ticks)", row.ticks);
   if (j.lost_ticks > 0) note += fmt::format(" {} lost", j.lost_ticks);
-  if (row.truncated_ticks > 0) note += fmt::format(" {} truncated", row.truncated_ticks);
   if (!row.faults.empty()) note += fmt::format(" {} faults", row.faults.size());
   return rigid_table().line(row, note);
 }
 
-std::string ratio_table(const std::vector<RigidRow>& rows) {
-  const auto beside = [&](Engine engine, double Percentiles::*which, const RigidRow& row) {
+namespace {
+
+struct Ratio {
+  double value = 0.0;
+  bool whole = true;  // false: the other engine was stopped before the end of the path
+};
+
+// The ratios of one engine to the product.
+class Ratios {
+ public:
+  Ratios(const std::vector<RigidRow>& rows, Engine engine, double Percentiles::*which)
+      : rows_(rows), engine_(engine), which_(which) {}
+
+  [[nodiscard]] std::optional<Ratio> of(const RigidRow& own) const {
     const auto other = std::ranges::find_if(
-        rows, [&](const RigidRow& r) { return r.engine == engine && same_work(row, r); });
-    return other == rows.end() ? std::string("-")
-                               : fmt::format("{:.2f}", other->tick_us.*which / row.tick_us.*which);
+        rows_, [&](const RigidRow& r) { return r.engine == engine_ && same_work(own, r); });
+    if (other == rows_.end() || !(own.least_us.*which_ > 0.0)) return std::nullopt;
+    return Ratio{other->least_us.*which_ / (own.least_us.*which_), other->ticks >= own.ticks};
+  }
+  // The geometric mean over the rows of the product, without partial ones unless there are no others.
+  [[nodiscard]] std::optional<Ratio> mean() const {
+    const std::optional<Ratio> whole = mean_of(true);
+    return whole ? whole : mean_of(false);
+  }
+
+ private:
+  [[nodiscard]] std::optional<Ratio> mean_of(bool whole) const {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (const RigidRow& row : rows_) {
+      if (row.engine != Engine::hybrid) continue;
+      const std::optional<Ratio> ratio = of(row);
+      if (!ratio || ratio->whole != whole || !(ratio->value > 0.0)) continue;
+      sum += std::log(ratio->value);
+      ++count;
+    }
+    if (count == 0) return std::nullopt;
+    return Ratio{std::exp(sum / static_cast<double>(count)), whole};
+  }
+
+  const std::vector<RigidRow>& rows_;
+  Engine engine_;
+  double Percentiles::*which_;
+};
+
+std::string ratio_text(const std::optional<Ratio>& ratio) {
+  if (!ratio) return "-";
+  return fmt::format("{:.2f}{}", ratio->value, ratio->whole ? "" : "*");
+}
+
+// A row without a path stands for the means.
+Table<RigidRow>::Column ratio_column(const std::string& title, const std::string& below, Ratios ratios) {
+  return {{title, below}, 8, Side::right, [ratios](const RigidRow& row) {
+            return ratio_text(row.path.empty() ? ratios.mean() : ratios.of(row));
+          }};
+}
+
+}  // namespace
+
+std::string ratio_table(const std::vector<RigidRow>& rows) {
+  const auto own_time = [](double Percentiles::*which) {
+    return [which](const RigidRow& row) {
+      return row.path.empty() ? std::string() : microseconds(row.least_us.*which);
+    };
   };
-  const auto ratio = [&beside](Engine engine, double Percentiles::*which) {
-    return [&beside, engine, which](const RigidRow& row) { return beside(engine, which, row); };
+  const auto unless_means = [](auto cell) {
+    return [cell](const RigidRow& row) { return row.path.empty() ? std::string() : cell(row); };
   };
-  const bool any = std::ranges::any_of(rows, [&](const RigidRow& row) {
-    return row.engine == Engine::hybrid && (beside(Engine::cgal_aabb, &Percentiles::p50, row) != "-" ||
-                                            beside(Engine::no_map, &Percentiles::p50, row) != "-");
-  });
-  if (!any) return {};
-  const Table<RigidRow> table({
-      {{"path"}, 10, Side::left, [](const RigidRow& row) { return row.path; }},
+  std::vector<Table<RigidRow>::Column> columns{
+      {{"path"}, 10, Side::left, [](const RigidRow& row) { return row.path.empty() ? "mean" : row.path; }},
       {{"mesh"}, 9, Side::left, mesh_text},
-      {{"ball"}, 5, Side::right, ball_text},
-      {{"m/s"}, 6, Side::right, speed_text},
-      {{"p50 us"}, 9, Side::right, time(&Percentiles::p50)},
-      {{"p99 us"}, 9, Side::right, time(&Percentiles::p99)},
-      {{"cgal-aabb", "p50 x"}, 9, Side::right, ratio(Engine::cgal_aabb, &Percentiles::p50)},
-      {{"", "p99 x"}, 9, Side::right, ratio(Engine::cgal_aabb, &Percentiles::p99)},
-      {{"no-map", "p50 x"}, 9, Side::right, ratio(Engine::no_map, &Percentiles::p50)},
-      {{"", "p99 x"}, 9, Side::right, ratio(Engine::no_map, &Percentiles::p99)},
-  });
+      {{"ball"}, 5, Side::right, unless_means(ball_text)},
+      {{"m/s"}, 6, Side::right, unless_means(speed_text)},
+      {{"hybrid", "p50 us"}, 7, Side::right, own_time(&Percentiles::p50)},
+      {{"", "p99 us"}, 7, Side::right, own_time(&Percentiles::p99)}};
+  bool any = false;
+  for (const Engine engine : kEngines) {
+    const Ratios p50(rows, engine, &Percentiles::p50), p99(rows, engine, &Percentiles::p99);
+    if (engine == Engine::hybrid || !p50.mean()) continue;
+    any = true;
+    columns.push_back(ratio_column(engine_name(engine), "p50 x", p50));
+    columns.push_back(ratio_column("", "p99 x", p99));
+  }
+  if (!any) return {};
+  const Table<RigidRow> table(std::move(columns));
   std::string text = table.head();
   for (const RigidRow& row : rows) {
     if (row.engine == Engine::hybrid) text += table.line(row, place_text(row));
   }
-  return text;
+  return text + table.line(RigidRow());
 }
 
 }  // namespace hybrid::bench

@@ -19,6 +19,8 @@ struct RigidRow {
   Engine engine = Engine::hybrid;
   std::size_t ticks = 0, path_ticks = 0;  // measured, and of the whole path
   Percentiles tick_us;
+  // Of each tick's least time in kPasses passes, with that of moving the body (TouchRun::least_us).
+  Percentiles least_us;
   std::optional<Percentiles> pose_us;  // moving the body
   double timer_overhead_us = 0.0;
   double steps_mean = 0.0, surveys_per_tick = 0.0;
@@ -34,8 +36,10 @@ nlohmann::ordered_json to_json(const RigidRow& row);
 
 std::string table_head();
 std::string table_line(const RigidRow& row);
-// The same path and mesh through each engine: p50 and p99 of the product, and how often longer the others
-// take.
+// The same path and mesh through each engine: p50 and p99 of the product's least times, and how many times as
+// long the others take, with the geometric means of these ratios. Where the body moves, moving it counts. A
+// star marks an engine that was stopped before the end of the path: its ticks are others, and the mean leaves
+// it out.
 std::string ratio_table(const std::vector<RigidRow>& rows);
 
 }  // namespace hybrid::bench

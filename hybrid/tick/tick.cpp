@@ -27,26 +27,49 @@ namespace {
 constexpr double kFarthestDevice_m = 1e12;   // m; a thousand times the largest scene
 constexpr double kLongestTick_s = 86'400.0;  // a day: times stay finite however many ticks are added
 
+using Clock = std::chrono::steady_clock;
+
+double us_between(Clock::time_point from, Clock::time_point to) noexcept {
+  return std::chrono::duration<double, std::micro>(to - from).count();
+}
+
+// The last reading of this thread's CPU time, and the wall time that followed it and counts as CPU time.
+struct CpuReading {
+  double cpu_us = 0.0, short_us = 0.0;
+  Clock::time_point last{};  // end of the time that is accounted for
+  int ticks_left = 0;        // until the next reading is due
+};
+constinit thread_local CpuReading cpu_reading;
+
 // Measures the CPU time of each stage, so that pre-emption does not count. A read of the thread's CPU time is
 // a system call and takes up to 2 µs; the wall clock takes 0.03 µs. So a stage is timed by the wall clock
-// first. If its wall time is long enough to hide a pre-emption, CPU time is read and replaces it. The tick is
-// the sum of its stages.
+// first. If its wall time is long enough to hide a pre-emption, CPU time is read and replaces it. Time
+// between two ticks is treated alike, so ticks in close succession share one reading. The tick is the sum of
+// its stages.
 class StageClock {
  public:
-  explicit StageClock(TickResult& result)
-      : result_(result), cpu_us_(1e6 * thread_time_s()), last_(Clock::now()) {}
-  void done(Stage stage) noexcept {
-    const auto now = Clock::now();
-    double us = std::chrono::duration<double, std::micro>(now - last_).count();
-    last_ = now;
-    if (us > kShort_us) {
-      const double cpu_us = 1e6 * thread_time_s();
-      us = std::max(0.0, cpu_us - cpu_us_ - short_us_);
-      cpu_us_ = cpu_us;
-      short_us_ = 0.0;
-      last_ = Clock::now();
+  explicit StageClock(TickResult& result) : result_(result), of_thread_(cpu_reading) {
+    const Clock::time_point now = Clock::now();
+    const double between_us = us_between(of_thread_.last, now);
+    if (of_thread_.ticks_left > 0 && between_us <= kShort_us) {
+      --of_thread_.ticks_left;
+      of_thread_.short_us += between_us;
+      of_thread_.last = now;
     } else {
-      short_us_ += us;
+      of_thread_.ticks_left = kTicksPerReading;
+      read();
+    }
+  }
+  void done(Stage stage) noexcept {
+    const Clock::time_point now = Clock::now();
+    double us = us_between(of_thread_.last, now);
+    of_thread_.last = now;
+    if (us > kShort_us) {
+      const double before_us = of_thread_.cpu_us + of_thread_.short_us;
+      read();
+      us = std::clamp(of_thread_.cpu_us - before_us, 0.0, us);
+    } else {
+      of_thread_.short_us += us;
     }
     result_.stage_us[static_cast<std::size_t>(stage)] += static_cast<float>(us);
   }
@@ -60,13 +83,18 @@ class StageClock {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
   static constexpr double kShort_us = 10.0;  // longest wall time that is taken as CPU time
+  // A reading serves so many ticks: pre-emptions too short to notice must not add up.
+  static constexpr int kTicksPerReading = 256;
+
+  void read() noexcept {
+    of_thread_.cpu_us = 1e6 * thread_time_s();
+    of_thread_.short_us = 0.0;
+    of_thread_.last = Clock::now();
+  }
 
   TickResult& result_;
-  double cpu_us_;          // thread's CPU time when it was last read
-  double short_us_ = 0.0;  // wall time of the stages since that read
-  Clock::time_point last_;
+  CpuReading& of_thread_;
 };
 
 // Is the position valid? One beyond kFarthestDevice_m is as invalid as NaN.
@@ -116,6 +144,31 @@ void relax_tissue(const World& world, WorldState& state, StageClock& clock) noex
   refresh_obstacles_of_arrived_rows(world, state);
   clock.done(Stage::background);
   clock.leave_out(Stage::background, state.async.other_thread_us);
+}
+
+// After the tool: soft objects react to one another, to bodies and to the tool, and the map follows.
+void let_tissue_follow(const World& world, WorldState& state, const glm::dvec3& before,
+                       const Neighbourhood& around, double dt_s, Sweep& sweep, StageClock& clock) noexcept {
+  // Soft objects that meet may push one another back into the tool's way. So the tool gives way after their
+  // contacts are solved. If no soft objects can meet, tissue relaxes after the tool gave way.
+  const bool may_meet = !world.soft_pairs.empty();
+  if (may_meet) {
+    relax_tissue(world, state, clock);
+    solve_soft_contacts(world, state);
+  }
+  if (around.near_soft) give_way(world, state, before, sweep);
+  flag_lost_tool(world, state);
+  clock.done(Stage::arbitration);
+  if (!may_meet) relax_tissue(world, state, clock);
+
+  // This is the last step that moves bodies or tissue, so that no body overlaps tissue at the end of the
+  // tick.
+  push_bodies_out_of_tissue(world, state, dt_s);
+  flag_squeezed_bodies(world, state);
+  clock.done(Stage::arbitration);
+
+  refresh_map(world, state);
+  clock.done(Stage::map);
 }
 
 // The last operations on the force, in the order that device/README.md justifies.
@@ -168,26 +221,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
   refresh_obstacles(world, state);
   clock.done(Stage::contact);
 
-  // Soft objects that meet may push one another back into the tool's way. So the tool gives way after their
-  // contacts are solved. If no soft objects can meet, tissue relaxes after the tool gave way.
-  const bool may_meet = !world.soft_pairs.empty();
-  if (may_meet) {
-    relax_tissue(world, state, clock);
-    solve_soft_contacts(world, state);
-  }
-  if (around.near_soft) give_way(world, state, before, sweep);
-  flag_lost_tool(world, state);
-  clock.done(Stage::arbitration);
-  if (!may_meet) relax_tissue(world, state, clock);
-
-  // This is the last step that moves bodies or tissue, so that no body overlaps tissue at the end of the
-  // tick.
-  push_bodies_out_of_tissue(world, state, dt_s);
-  flag_squeezed_bodies(world, state);
-  clock.done(Stage::arbitration);
-
-  refresh_map(world, state);
-  clock.done(Stage::map);
+  if (!state.soft.empty()) let_tissue_follow(world, state, before, around, dt_s, sweep, clock);
 
   publish_force(world, state, sweep, input, dt_s, result);
   ++state.tick;

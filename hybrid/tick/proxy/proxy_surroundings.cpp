@@ -60,9 +60,7 @@ bool ProxySurroundings::survey_from(const glm::dvec3& point) noexcept {
     if (query_cut_way_) query_cells_ *= kRangeGrowth;  // too short a range for this motion
     state_.look_at = point_;
     state_.look_m = radius_ + query_cells_ * state_.map.cell_m();
-    state_.look_mask =
-        world_.use_map ? state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m, state_.map_trail)
-                       : ~std::uint64_t{0};
+    state_.look_mask = world_.use_map ? near_objects() : ~std::uint64_t{0};
     query_cut_way_ = false;
     // A neighbourhood out of range does not follow the proxy, which may come back on another side.
     for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
@@ -79,6 +77,17 @@ bool ProxySurroundings::survey_from(const glm::dvec3& point) noexcept {
   }
   cutting_object_ = 0;
   return true;
+}
+
+// The bits of the objects within look_m of the viewpoint. An element that holds the proxy answers for the
+// only object of a scene without a query, and the map would say the same.
+std::uint64_t ProxySurroundings::near_objects() noexcept {
+  if (world_.rigid.size() == 1 && state_.active_count > 0) {
+    const glm::dvec3 view = state_.rigid[0].frame.to_body(point_);
+    const double distance = world_.rigid[0].surface->closest(state_.active[0].element, view).distance;
+    if (distance < state_.look_m - rounding_) return OccupancyMap::rigid_bit(0);
+  }
+  return state_.map.rigid_in(point_ - state_.look_m, point_ + state_.look_m, state_.map_trail);
 }
 
 bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept {
