@@ -76,7 +76,7 @@ constexpr std::array kWords{
     Words{"axis component value in of the along", Meaning::nothing},
     Words{"tx ty tz", Meaning::turning},
     Words{"torque moment vel velocity acc acceleration rate dot derivative error err std var cov offset bias "
-          "orientation rotation quaternion quat",
+          "orientation rotation quaternion quat between",
           Meaning::not_wanted}};
 
 // Is `word` one of the words of `list`, which are separated by blanks?

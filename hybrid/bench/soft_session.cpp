@@ -87,6 +87,7 @@ SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftB
                                             .keep_rows = false,
                                             .keep_recording = false,
                                             .reference_samples = kSamples,
+                                            .reference = Reference::full,
                                             .progress = {},
                                             .async_relaxation = true});
   device::stop_if_asked();

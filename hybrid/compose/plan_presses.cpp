@@ -317,9 +317,8 @@ std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, con
   return points;
 }
 
-// The best places, at most kMostRigid and kMostSoft. They are in the order of visits: view after view, and
-// within a view always the nearest place next.
-std::vector<Chosen> choose(const Surfaces& all, const std::vector<HeightMap>& maps) {
+// The best place of each target, from whichever view it is best reached. Score 0: no view reaches it.
+std::vector<Chosen> best_places(const Surfaces& all, const std::vector<HeightMap>& maps) {
   std::vector<Chosen> best(all.targets.size());
   for (std::size_t view = 0; view < maps.size(); ++view) {
     const std::vector<HeightMap::Spot> spots = maps[view].best(all);
@@ -327,6 +326,12 @@ std::vector<Chosen> choose(const Surfaces& all, const std::vector<HeightMap>& ma
       if (spots[t].score > best[t].spot.score) best[t] = {view, t, spots[t]};
     }
   }
+  return best;
+}
+
+// The best places, at most kMostRigid and kMostSoft. They are in the order of visits: view after view, and
+// within a view always the nearest place next.
+std::vector<Chosen> choose(const Surfaces& all, std::vector<Chosen> best) {
   std::erase_if(best, [](const Chosen& c) { return c.spot.score <= 0.0; });
   std::stable_sort(best.begin(), best.end(),
                    [](const Chosen& a, const Chosen& b) { return a.spot.score > b.spot.score; });
@@ -357,7 +362,7 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
   std::vector<HeightMap> maps;
   maps.reserve(views.size());
   for (const View& view : views) maps.emplace_back(all, view, tool_radius_m);
-  const std::vector<Chosen> presses = choose(all, maps);
+  const std::vector<Chosen> places = best_places(all, maps), presses = choose(all, places);
   const double clearance = std::max(kClearance_m, 2.0 * tool_radius_m);
   const auto outside = [&](const View& view) {  // height along the view
     return std::max(view.sign * all.low[view.axis], view.sign * all.high[view.axis]) + tool_radius_m +
@@ -408,7 +413,7 @@ PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double 
   for (std::size_t t = 0; t < all.targets.size(); ++t) {
     const bool pressed =
         std::any_of(presses.begin(), presses.end(), [&](const Chosen& c) { return c.target == t; });
-    if (!pressed) path.hidden.push_back(all.targets[t].name);
+    if (!pressed) path.not_pressed.push_back({all.targets[t].name, places[t].spot.score <= 0.0});
   }
   const glm::dvec3 size = all.high - all.low;
   path.speed_m_per_s = std::clamp(0.3 * std::max({size.x, size.y, size.z}), 0.01, kFastest_m_per_s);

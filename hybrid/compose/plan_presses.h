@@ -20,17 +20,29 @@ struct PathPoint {
 struct Press {
   std::string what, where;  // for example "liver (label 5)" and "from the front"
 };
+// Something that the path does not press.
+struct NotPressed {
+  std::string what;
+  bool hidden = false;  // others lie in front of it on every side; false: others are easier to reach
+};
 struct PressPath {
   std::vector<PathPoint> points{};
   std::vector<Press> presses{};
   double speed_m_per_s = 0.05;
-  std::vector<std::string> hidden{};  // targets that no press reaches, because others lie in front of them
+  std::vector<NotPressed> not_pressed{};
 };
+
+// The reason, in words that follow "not pressed, ".
+[[nodiscard]] constexpr const char* not_pressed_why(bool hidden) {
+  return hidden ? "because others lie in front on every side" : "because others are easier to reach";
+}
 
 // Plans a path of presses. Along each axis, in both directions, a height map that is dilated by the tool
 // gives the first contact of a ball that comes along the axis. Each kind of bone, mesh and tissue is pressed
-// once, from the direction that most of it faces. Between two presses the tool strokes over the surface. From
-// one view to the next it moves round the scene's box. `built` has the objects of `parts`, in order.
+// once, from the direction that most of it faces; those that others hide from all six directions are not
+// pressed, and at most eight rigid and eight soft ones are. Between two presses the tool strokes over the
+// surface. From one view to the next it moves round the scene's box. `built` has the objects of `parts`, in
+// order.
 PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double tool_radius_m);
 
 }  // namespace hybrid

@@ -169,14 +169,37 @@ void add_soft(std::string& text, const SceneParts& parts, const MaterialNames& n
   }
 }
 
+// Says which parts the path does not press, and why. Lines are as long as those of the scene's other
+// comments.
+void add_not_pressed(std::string& text, const PressPath& path) {
+  constexpr std::size_t kLineLength = 105;
+  for (const bool hidden : {true, false}) {
+    std::string line = fmt::format("# Not pressed, {}:", not_pressed_why(hidden));
+    bool any = false;
+    for (const NotPressed& n : path.not_pressed) {
+      if (n.hidden != hidden) continue;
+      const std::string word = (any ? ", " : " ") + plain(n.what);
+      if (line.size() + word.size() > kLineLength) {
+        text += line + (any ? ",\n" : "\n");
+        line = "#   " + plain(n.what);
+      } else {
+        line += word;
+      }
+      any = true;
+    }
+    if (any) text += line + "\n";
+  }
+}
+
 void add_path(std::string& text, const PressPath& path) {
   text +=
       "# Where the simulated hand goes: [x, y, z] or [x, y, z, seconds to hold]. A comment names the press "
       "of its\n"
       "# point; the points after it are the way over the surface to the next one. kind = \"lissajous\", "
       "\"slide\" or a recorded \"csv\" "
-      "are other paths.\n"
-      "[path]\nkind = \"waypoints\"\n";
+      "are other paths.\n";
+  add_not_pressed(text, path);
+  text += "[path]\nkind = \"waypoints\"\n";
   text += fmt::format("speed = {:.3g} # mm/s\npoints = [\n", path.speed_m_per_s * 1e3);
   for (const PathPoint& p : path.points) {
     const glm::dvec3 mm = p.at_m * 1e3;

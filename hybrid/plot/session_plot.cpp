@@ -128,9 +128,10 @@ Panel force_panel(std::span<const TraceRow> rows, const std::vector<double>& t,
   if (count(false) > 0) panel.series.push_back({"rigid objects", t, std::move(rigid), series_colour(0)});
   if (count(true) > 0) panel.series.push_back({"soft objects", t, std::move(soft), series_colour(1)});
   // If there are several things of a kind, each gets a dashed line. Its force is a part of the sums above.
+  // The last colour, black, is the total's.
   std::size_t colour = 2;
   for (const Touched& thing : things) {
-    if (thing.force_N.empty() || count(thing.soft) < 2 || colour >= kSeriesColours) continue;
+    if (thing.force_N.empty() || count(thing.soft) < 2 || colour + 1 >= kSeriesColours) continue;
     panel.series.push_back({thing.name, t, thing.force_N, series_colour(colour++), 1.4, true});
   }
   return panel;
@@ -166,10 +167,11 @@ Panel clearance_panel(const ClearanceCourse& near) {
       if (g < deepest) deepest = g;
     }
     if (std::ranges::none_of(gap_mm, [](double g) { return std::isfinite(g); })) return;
-    panel.series.push_back({std::string(name) + ", at most " +
-                                with_decimals(100.0 * std::fabs(deepest) / near.cell_m, 2) + " %" +
-                                " of a cell deep",
-                            near.t_s, std::move(gap_mm), series_colour(colour)});
+    const std::string overlap =
+        deepest < 0.0
+            ? ", overlap at most " + with_decimals(-100.0 * deepest / near.cell_m, 2) + " % of a voxel"
+            : ", no overlap";
+    panel.series.push_back({name + overlap, near.t_s, std::move(gap_mm), series_colour(colour)});
   };
   add("tissue and rigid", near.rigid_m, 0);
   add("tissue and tissue", near.soft_m, 1);

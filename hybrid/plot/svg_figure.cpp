@@ -132,6 +132,9 @@ struct LegendEntry {
 std::vector<LegendEntry> legend_of(const Panel& panel) {
   std::vector<LegendEntry> entries;
   for (const Series& s : panel.series) entries.push_back({s.name, s.colour, false, s.dashed});
+  for (const ReferenceLine& line : panel.lines) {
+    if (plottable(line.y)) entries.push_back({line.label, line.colour, false, true});
+  }
   for (const Area& a : panel.areas) entries.push_back({a.name, a.colour, true, false});
   for (const Bands& b : panel.bands) entries.push_back({b.name, b.colour, true, false});
   std::erase_if(entries, [](const LegendEntry& e) { return e.name.empty(); });
@@ -215,12 +218,6 @@ void draw_lanes(Svg& svg, const Panel& panel, const Axes& axes, std::size_t show
   }
 }
 
-// Position of a line's label: above the line, or below it if the top of the panel is too near.
-double label_y(const Axes& axes, double value) {
-  const double y = axes.y.page(value);
-  return y - axes.top < 16.0 ? y + 13.0 : y - 4.0;
-}
-
 void draw_panel(Svg& svg, const Panel& panel, Axes axes, std::size_t points, std::size_t lanes) {
   const bool has_lanes = !panel.lanes.empty();
   double y_label_x = 14.0;
@@ -254,18 +251,13 @@ void draw_panel(Svg& svg, const Panel& panel, Axes axes, std::size_t points, std
     if (axes.y.values().from < 0.0 && axes.y.values().to > 0.0) {
       svg.line(axes.left, axes.y.page(0.0), axes.left + axes.width, axes.y.page(0.0), "#888888");
     }
+    for (const Series& series : panel.series) draw_series(svg, series, axes, points);
     for (const ReferenceLine& line : panel.lines) {
       if (!plottable(line.y)) continue;
       svg.line(axes.left, axes.y.page(line.y), axes.left + axes.width, axes.y.page(line.y), line.colour,
-               "stroke-dasharray=\"3 3\"");
+               "stroke-width=\"1.4\" stroke-dasharray=\"6 4\"");
     }
-    for (const Series& series : panel.series) draw_series(svg, series, axes, points);
     svg.body += "</g>\n";
-    for (const ReferenceLine& line : panel.lines) {
-      if (!plottable(line.y)) continue;
-      svg.text(axes.left + axes.width - 6.0, label_y(axes, line.y), line.label,
-               "class=\"t p h\" text-anchor=\"end\"");
-    }
     const bool nothing = std::ranges::none_of(
         panel.series, [](const Series& s) { return std::ranges::any_of(s.y, plottable); });
     if (nothing) {
@@ -405,8 +397,7 @@ std::string to_svg(const Figure& figure) {
          escaped(figure.title) +
          "</title>\n<style>text{font-family:Helvetica,Arial,'DejaVu Sans',sans-serif;fill:#1c2129}"
          ".t{font-size:12px}.p{fill:#5c6572}.h1{font-size:18px;font-weight:bold}"
-         ".h2{font-size:13px;font-weight:bold}"
-         ".h{paint-order:stroke;stroke:#ffffff;stroke-width:3px}</style>\n<defs>\n" +
+         ".h2{font-size:13px;font-weight:bold}</style>\n<defs>\n" +
          clips + "</defs>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n" + svg.body + "</svg>\n";
 }
 

@@ -34,6 +34,7 @@ struct Bands {
   std::string colour = "#eeeeee";
 };
 
+// A dashed line across a panel. Its label is in the legend, where it covers no data.
 struct ReferenceLine {
   double y = 0.0;
   std::string label;

@@ -25,8 +25,9 @@ struct RunCommand {
   std::filesystem::path scene;
   std::optional<double> seconds;
   bool realtime = false;
-  std::string device;       // replaces the scene's device; empty: the scene's
-  int samples = 1'000'000;  // ticks whose force is compared with a slow run; by default all
+  std::string device;               // replaces the scene's device; empty: the scene's
+  int samples = 1'000'000;          // ticks whose force is compared with a slow run; by default all
+  std::string reference = "quick";  // "quick" or "full" (Reference)
   std::uint64_t start_ticks = 0;
   // Where tissue away from the contact is relaxed: "apart" (on a thread of its own) or "tick".
   std::string relaxation = "apart";

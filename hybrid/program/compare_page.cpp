@@ -135,7 +135,7 @@ Page scenes_page(const ScenesComparison& comparison, const Figure& figure, const
        .parts = {scenes_table(comparison),
                  fmt::format("Own error: against the same scene along the same path, {} times slower. Ticks "
                              "are timed in alternating order, not pinned to a core.",
-                             kSlower)}});
+                             kQuickSlower)}});
   page.sections.push_back(
       {.heading = "Force of each scene",
        .parts = {

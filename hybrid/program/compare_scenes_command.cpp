@@ -137,7 +137,7 @@ void print_scenes(std::FILE* words, const ScenesComparison& comparison, bool own
   const std::string own = own_error ? fmt::format(
                                           "greatest JND against the same scene along the same path, {} "
                                           "times slower; -: nothing soft was felt",
-                                          kSlower)
+                                          kQuickSlower)
                                     : "not measured, as --samples is 0: the times stand without it";
   fmt::print(words,
              "\ndifferences are from {}; 1 JND = max({:.0f} % of its force, {:.2f} N)\nown error: {}\n"

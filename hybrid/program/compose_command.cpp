@@ -57,6 +57,20 @@ void print_table(std::FILE* out, const std::vector<ComposedPart>& rows) {
   fmt::print(out, "{}", table.text(rows));
 }
 
+void print_not_pressed(std::FILE* out, const PressPath& path) {
+  for (const bool hidden : {true, false}) {
+    std::vector<std::string_view> names;
+    for (const NotPressed& n : path.not_pressed) {
+      if (n.hidden == hidden) names.push_back(n.what);
+    }
+    if (names.empty()) continue;
+    const std::size_t more = names.size() - std::min(names.size(), kMostNamed);
+    names.resize(names.size() - more);
+    fmt::print(out, "not pressed, {}: {}{}\n", not_pressed_why(hidden), joined(names),
+               more > 0 ? fmt::format(" and {} more", more) : "");
+  }
+}
+
 Json composition_report(const Composed& composed) {
   Json json = report_head("compose");
   json["scene"] = composed.scene.string();
@@ -74,6 +88,9 @@ Json composition_report(const Composed& composed) {
   json["presses"] = Json::array();
   for (const Press& press : composed.path.presses)
     json["presses"].push_back({{"what", press.what}, {"from", press.where}});
+  json["not_pressed"] = Json::array();
+  for (const NotPressed& n : composed.path.not_pressed)
+    json["not_pressed"].push_back({{"what", n.what}, {"hidden", n.hidden}});
   json["path_s"] = composed.path_s;
   json["tool_radius_m"] = composed.tool_radius_m;
   json["notes"] = composed.notes;
@@ -99,14 +116,7 @@ int compose(const ComposeCommand& command) {
     fmt::print(words, "\nthe path presses, with a ball of {:.3g} mm radius:\n", composed.tool_radius_m * 1e3);
     for (const Press& press : composed.path.presses) fmt::print(words, "  {}, {}\n", press.what, press.where);
   }
-  const std::vector<std::string>& hidden = composed.path.hidden;
-  if (!hidden.empty()) {
-    const std::size_t listed_names = std::min(hidden.size(), kMostNamed);
-    fmt::print(words, "not pressed, as others lie before it on every side or are easier to reach: {}{}\n",
-               joined(std::vector<std::string_view>(
-                   hidden.begin(), hidden.begin() + static_cast<std::ptrdiff_t>(listed_names))),
-               listed_names < hidden.size() ? fmt::format(" and {} more", hidden.size() - listed_names) : "");
-  }
+  print_not_pressed(words, composed.path);
   const std::string scene = composed.scene.string();
   fmt::print(words, "\n{}: written; its path takes {:.0f} s\nnext: hybrid run {} --picture {}\n", scene,
              composed.path_s, in_shell(scene),

@@ -24,12 +24,9 @@ constexpr const char* kAbout =
     "Touch scenes of rigid and soft objects through a (simulated) force-feedback device.\n\n"
     "  hybrid run scenes/head.toml --plot head.svg --picture head.png   feel a scene, see what was felt\n"
     "  hybrid compare scenes/cube.toml --plot cube.svg                  proxy against voxels, same motion\n"
-    "  hybrid view scenes/head.toml                                     a window; drag the tool with the "
-    "mouse\n"
-    "  hybrid check skull.stl ct.nii.gz my-scene.toml                   what a file is, and what is wrong "
-    "with it\n"
-    "  hybrid compose --labels labels.nii.gz --names labels.csv --out body   a scene from a segmented "
-    "scan\n\n"
+    "  hybrid view scenes/head.toml                                     a window; drag the tool\n"
+    "  hybrid check skull.stl ct.nii.gz my-scene.toml                   the contents and faults of files\n"
+    "  hybrid compose --labels labels.nii.gz --names labels.csv --out body   a scene from a scan\n\n"
     "A scene is one small text file; scenes/README.md describes its keys.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage, 130 Ctrl-C.";
 
@@ -61,9 +58,10 @@ void add_run(CLI::App& app, int& status) {
   add_device(*sub, c->device);
   auto* samples = sub->add_option(
       "--samples", c->samples,
-      "most ticks in which the force of tissue is compared with the same path played slowly, which takes "
-      "several times as long as the session; 0: none; default: all");
+      "most ticks whose force of tissue is compared with the same path played slowly; 0: none; default: all");
   samples->check(CLI::Range(0, 1'000'000));
+  auto* reference = sub->add_option("--reference", c->reference, "5 (quick) or 10 (full) times slower");
+  reference->check(CLI::IsMember({"quick", "full"}))->capture_default_str();
   sub->add_option("--start-ticks", c->start_ticks,
                   "begin with all clocks and counters as after so many ticks; nothing felt should differ");
   sub->add_option(
@@ -84,9 +82,11 @@ void add_run(CLI::App& app, int& status) {
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
   add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, samples, &status] {
+  sub->callback([c, samples, reference, &status] {
     if (samples->count() > 0 && c->samples > 0 && c->realtime)
       throw CLI::ValidationError("--samples", "has no effect with --realtime; leave one of them out");
+    if (reference->count() > 0 && (c->realtime || c->samples == 0))
+      throw CLI::ValidationError("--reference", "has no effect with --realtime or --samples 0");
     status = hybrid::run(*c);
   });
 }

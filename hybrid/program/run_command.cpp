@@ -126,8 +126,10 @@ int run(const RunCommand& command) {
                          .keep_recording = !command.record.empty(),
                          .keep_clearance = !command.plot.empty() || paged,
                          .between_samples = kBetweenSamples,
+                         .between_every_tick = !command.trace.empty(),
                          .keep_picture = !command.picture.empty() || paged,
                          .reference_samples = command.samples,
+                         .reference = command.reference == "full" ? Reference::full : Reference::quick,
                          .start_ticks = command.start_ticks,
                          .progress = progress,
                          .async_relaxation = command.relaxation == "apart",
@@ -141,7 +143,9 @@ int run(const RunCommand& command) {
 
   using Path = std::filesystem::path;
   const std::string title = scene.title.empty() ? command.scene.stem().string() : scene.title;
-  outputs.write("trace", command.trace, [&](const Path& file) { save_trace(file, result.rows); });
+  outputs.write("trace", command.trace, [&](const Path& file) {
+    save_trace(file, result.rows, pair_columns(*built.world, result.between));
+  });
   outputs.write("recording", command.record, [&](const Path& file) {
     save_recording(file, {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
                           scene_limits(scene), options.async_relaxation, result.state_hash, result.start_m,

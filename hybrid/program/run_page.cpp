@@ -171,9 +171,9 @@ PageSection error_section(const Scene& scene, const SessionResult& result) {
     return section;
   }
   section.parts.emplace_back(fmt::format(
-      "Each tick with tissue in contact is compared with the same path played {} times slower. One JND, the "
+      "Each tick with tissue in contact is compared with {}. One JND, the "
       "difference that a hand just notices, is {:.0f} % of the force and at least {:.3f} N. Found: {}.",
-      kSlower, 100.0 * kJndShare, jnd_floor_N(scene), in_words(error)));
+      reference_words(error), 100.0 * kJndShare, jnd_floor_N(scene), in_words(error)));
   PageTable table{.name = "force-error",
                   .caption = "Difference from equilibrium",
                   .head = {"device", "ticks compared", "largest (N)", "rms (N)", "largest (JND)", "at (s)"},

@@ -75,6 +75,7 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
       player.step(request);
     }
     player.snapshot(snapshot);
+    snapshot.presses = input.wants_presses ? player.presses() : std::vector<PairPress>();
     window.add_ticks(player.samples());
     if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message()))) break;
     if (!command.out.empty()) window.save_frame(frame_file(command.out, n));
@@ -113,10 +114,10 @@ class LiveSession {
   }
   // Waits until the servo thread leaves the state alone. Returns false if it does not answer.
   bool hold(PlayRequest request) {
-    request.hold = true;
+    request.hold = ++holds_;
     ask(request);
     for (int n = 0; n < kMostWaits && !ended_; ++n) {
-      if (player_.held()) return true;
+      if (player_.held() == request.hold) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return ended_;
@@ -169,8 +170,39 @@ class LiveSession {
   TripleBuffer<PlayRequest> requests_;
   std::atomic<bool> stop_{false}, ended_{false};
   std::chrono::steady_clock::time_point next_{};
+  std::uint32_t holds_ = 0;
   device::ServoReport report_;
   std::jthread thread_;
+};
+
+// Keeps the forces between objects for the window's list. To compute them the session is held for a moment:
+// a simulated hand does not notice, because held time does not count. A real hand would, so with a real
+// device they are computed only while the session is paused.
+class PressWatch {
+ public:
+  const std::vector<PairPress>& presses(const WindowInput& input, const PlayRequest& request,
+                                        const Player& player, LiveSession& session, std::uint64_t tick) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!input.wants_presses || (player.is_real() && !request.paused)) {
+      presses_.clear();
+      tick_ = kNever;
+    } else if (tick != tick_ && now >= next_ && session.hold(request)) {
+      presses_ = player.presses();
+      session.ask(request);
+      tick_ = tick;
+      const auto end = std::chrono::steady_clock::now();
+      next_ = end + std::max<std::chrono::steady_clock::duration>(kEvery, kRest * (end - now));
+    }
+    return presses_;
+  }
+
+ private:
+  static constexpr std::uint64_t kNever = ~std::uint64_t{0};
+  static constexpr std::chrono::milliseconds kEvery{200};  // least time between two updates of the list
+  static constexpr int kRest = 19;  // the session is held for at most one part in 20 of the time
+  std::vector<PairPress> presses_;
+  std::uint64_t tick_ = kNever;  // of presses_
+  std::chrono::steady_clock::time_point next_{};
 };
 
 // The window of a session, with the user's files, script and reloads of the scene.
@@ -198,6 +230,7 @@ device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& b
   LiveSession session(viewed, box);
   Player& player = *viewed.player;
   Snapshot shown;
+  PressWatch watch;
   bool open = true;
   while (open && !session.ended() && next == nullptr) {
     live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
@@ -207,6 +240,7 @@ device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& b
     for (const Edit& edit : input.edits) player.edit(edit);
     session.ask(request);
     session.shown(viewed.drawn, shown);
+    shown.presses = watch.presses(input, request, player, session, shown.tick);
     live.window.add_ticks(player.samples());
     open = live.window.frame(shown, notes_of(live, player, shown.t_s));
     live.files.save_what_was_asked(live.window, input, viewed, shown, [&] { return session.hold(request); });

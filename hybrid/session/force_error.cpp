@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -20,6 +21,10 @@ namespace {
 // the slow run tissue rests by then.
 constexpr double kBefore_s = 0.02, kUntilStill_s = 0.5;
 constexpr std::size_t kReportEvery = 64;  // ticks
+// The quick reference counts as at rest if its force changes by less than this within kRestTicks. A lag that
+// falls with the root of time is then below 0.4 JND after 0.1 s.
+constexpr double kAtRest_jnd = 0.02;
+constexpr std::size_t kRestTicks = 10;
 
 // Ticks since the device last moved; 0 while it moves.
 std::vector<std::size_t> ticks_still(const ForceCourse& course, double dt_s) {
@@ -49,6 +54,37 @@ double percentile(std::vector<double>& values, double share) {
   const auto i = static_cast<std::size_t>(share * static_cast<double>(values.size()));
   return values[std::min(i, values.size() - 1)];
 }
+
+// Decides when the reference is at rest under a device that stands still.
+class RestWatch {
+ public:
+  // Bodies that move may move the tissue while the device is still, so nothing counts as at rest then.
+  RestWatch(const World& world, const SlowRunOptions& options)
+      : at_rest_jnd_(options.at_rest_jnd), floor_N_(options.floor_N) {
+    for (const RigidObject& object : world.rigid) {
+      if (object.motion.moves()) at_rest_jnd_ = 0.0;
+    }
+  }
+  [[nodiscard]] bool at_rest() const { return at_rest_; }
+  // Call it after each tick.
+  void see(bool still, const glm::dvec3& reference_N) {
+    if (!still || at_rest_jnd_ <= 0.0) {
+      at_rest_ = false;
+      seen_ = 0;
+      return;
+    }
+    glm::dvec3& before_N = last_N_[seen_ % kRestTicks];
+    if (seen_ >= kRestTicks && jnd_of(before_N, reference_N, floor_N_) < at_rest_jnd_) at_rest_ = true;
+    before_N = reference_N;
+    ++seen_;
+  }
+
+ private:
+  double at_rest_jnd_, floor_N_;
+  bool at_rest_ = false;
+  std::size_t seen_ = 0;
+  std::array<glm::dvec3, kRestTicks> last_N_{};
+};
 
 // Collects the errors of compared ticks.
 class Errors {
@@ -88,7 +124,31 @@ class Errors {
   double longest_s_ = 0.0, beyond_s_ = 0.0;
 };
 
+// Replaces nested patches that are in use by wider ones, each object's once.
+void widen(WorldState& state, std::vector<bool>& wide) {
+  for (std::size_t o = 0; o < state.soft.size(); ++o) {
+    if (wide[o] || state.soft[o]->patches_in_use() == nullptr) continue;
+    state.soft[o]->widen_patches();
+    wide[o] = true;
+  }
+}
+
+bool uses_patches(const WorldState& state) {
+  return std::any_of(state.soft.begin(), state.soft.end(),
+                     [](const auto& object) { return object->uses_patches(); });
+}
+
 }  // namespace
+
+SlowRunOptions slow_run_options(Reference reference) {
+  SlowRunOptions options;
+  if (reference == Reference::full) return options;
+  options.slower = kQuickSlower;
+  options.slower_still = kSlower;
+  options.wide_patches = false;
+  options.at_rest_jnd = kAtRest_jnd;
+  return options;
+}
 
 ForceError compare_with_slow_run(const World& world, WorldState& state, const ForceCourse& course,
                                  const SlowRunOptions& options) {
@@ -105,6 +165,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
   const std::size_t stride =
       (contact + static_cast<std::size_t>(options.most) - 1) / static_cast<std::size_t>(options.most);
   Errors errors;
+  RestWatch rest(world, options);
   std::size_t seen = 0;
   glm::dvec3 from = state.device_m;
   for (std::size_t t = 0; t < course.size() && seen < contact; ++t) {
@@ -117,28 +178,37 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
                                    options.slower,
                                    100.0 * static_cast<double>(t) / static_cast<double>(course.size())));
     const CourseTick& tick = course[t];
-    const int parts = slow[t] ? options.slower : 1;
+    if (still[t] == 0) rest.see(false, {});
+    const int factor = still[t] > 0 && options.slower_still > 0 ? options.slower_still : options.slower;
+    const int parts = slow[t] && !rest.at_rest() ? factor : 1;
     TickResult felt;
     for (int n = 1; n <= parts; ++n) {
       const device::DeviceState at{
-          .position_m = n < parts ? glm::mix(from, tick.device_m, n / static_cast<double>(options.slower))
-                                  : tick.device_m};
+          .position_m =
+              n < parts ? glm::mix(from, tick.device_m, n / static_cast<double>(parts)) : tick.device_m};
       felt = haptic_tick(world, state, at, options.dt_s / parts);
     }
-    // Patches end within the object, which causes an error. The reference must not share it.
-    for (std::size_t o = 0; o < state.soft.size(); ++o) {
-      if (wide[o] || state.soft[o]->patches_in_use() == nullptr) continue;
-      state.soft[o]->widen_patches();
-      wide[o] = true;
-    }
+    if (options.wide_patches) widen(state, wide);
     from = tick.device_m;
     const glm::dvec3 reference = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    rest.see(still[t] > 0, reference);
     if (options.felt) options.felt(t, reference);
     if (!tick.soft || seen++ % stride != 0) continue;
     errors.add(glm::distance(tick.force_N, reference), jnd_of(tick.force_N, reference, options.floor_N),
                static_cast<double>(t) * options.dt_s, static_cast<double>(still[t]) * options.dt_s);
   }
-  return errors.result(options.dt_s);
+  ForceError error = errors.result(options.dt_s);
+  error.slower = options.slower;
+  error.wide_patches = options.wide_patches && uses_patches(state);
+  error.usual_patches = !options.wide_patches && uses_patches(state);
+  return error;
+}
+
+std::string reference_words(const ForceError& error) {
+  return fmt::format("the same path {} times slower{}", error.slower,
+                     error.wide_patches    ? ", on patches twice as wide"
+                     : error.usual_patches ? ", on the same patches"
+                                           : "");
 }
 
 std::string in_words(const ForceError& error) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The error of the tissue's force in a session. The reference is the same session with the device at the same
-// places, played kSlower times slower. So tissue has kSlower times the time to come to rest. The two forces
+// places, played several times slower. So tissue has several times the time to come to rest. The two forces
 // are compared in ticks in which something soft is in contact.
 #pragma once
 
@@ -16,9 +16,20 @@
 
 namespace hybrid {
 
-inline constexpr int kSlower = 10;  // factor on the duration of the slow run
+// Slow-down factors of the two references while the device moves. Where a lag falls with the slowness, or
+// with its root, the quick reference finds 0.89 or 0.81 of the error that the full one finds.
+inline constexpr int kQuickSlower = 5, kSlower = 10;
 // Below this speed the device counts as still: a tenth of a millimetre in 0.1 s.
 inline constexpr double kStill_m_per_s = 1e-3;
+
+// How carefully the reference is played.
+enum class Reference : std::uint8_t {
+  // kQuickSlower times slower while the device moves, and kSlower times while it is still, until the
+  // reference comes to rest. It takes about twice as long as the session.
+  quick,
+  // kSlower times slower, with nested patches twice as wide. It takes 4 to 60 times as long as the session.
+  full,
+};
 
 // One tick of a session.
 struct CourseTick {
@@ -38,7 +49,10 @@ struct ErrorRange {
 struct ForceError {
   ErrorRange all, moving, still;  // moving: the device is faster than kStill_m_per_s
   double p99_N = 0.0, p99_jnd = 0.0;
-  std::string not_measured;  // why no tick was compared, in words; empty if any tick was
+  int slower = kSlower;        // slow-down factor of the reference while the device moved
+  bool wide_patches = false;   // nested patches of the reference were wider; false if there were none
+  bool usual_patches = false;  // the reference had nested patches like the session's
+  std::string not_measured;    // why no tick was compared, in words; empty if any tick was
   // Time after the stop of the device from which every still tick is within 1 JND. Empty if there is none.
   std::optional<double> within_after_s;
 };
@@ -50,15 +64,28 @@ struct SlowRunOptions {
   bool async_relaxation = false;
   std::function<void(const std::string&)> progress;  // may be empty
   int slower = kSlower;                              // slow-down factor; at least 1
+  int slower_still = 0;                              // the same while the device is still; 0: `slower`
+  // Nested patches are twice as wide, so that the error at their ends is a part of the result.
+  bool wide_patches = true;
+  // While the device is still, the reference counts as at rest once its force has changed by less than this
+  // (JND) within kRestTicks. From there on it is played as fast as the session. 0: it never counts as at
+  // rest.
+  double at_rest_jnd = 0.0;
   // Called for each tick that is played, compared or not, with its number and the slow run's force (N). The
   // run ends with the last tick in which something soft is in contact. May be empty.
   std::function<void(std::size_t, const glm::dvec3&)> felt{};
 };
 
+// The options of a reference.
+[[nodiscard]] SlowRunOptions slow_run_options(Reference reference);
+
 // Plays `course` slowly from `state`. `state` must be a session that has just begun at the device's first
 // position.
 ForceError compare_with_slow_run(const World& world, WorldState& state, const ForceCourse& course,
                                  const SlowRunOptions& options);
+
+// The reference in words: "the same path 5 times slower", and whether nested patches were wider.
+std::string reference_words(const ForceError& error);
 
 // The error in one sentence: 'felt as at rest', or the error while the tool moves and for how long it lasts
 // afterwards.

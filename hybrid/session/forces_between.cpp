@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <tuple>
+#include <utility>
 
 #include "hybrid/tick/tissue/obstacles.h"
 #include "voxel/composite/grid.h"
@@ -174,28 +176,37 @@ ForcesBetween forces_between(const World& world, const WorldState& state) {
   return forces;
 }
 
+// The course of a pair. A pair that touches for the first time gets a new one, in the order of objects.
+PairCourse& ForcesCourse::course_of(const ObjectPair& pair) {
+  const auto order = [](const ObjectPair& p) { return std::tuple(p.soft, p.kind, p.other); };
+  const auto at = std::find_if(pairs.begin(), pairs.end(),
+                               [&](const PairCourse& course) { return order(pair) <= order(course.pair); });
+  if (at != pairs.end() && at->pair == pair) return *at;
+  PairCourse fresh{.pair = pair};
+  if (keep_every) fresh.every_N.assign(samples, 0.0);
+  return *pairs.insert(at, std::move(fresh));
+}
+
 void ForcesCourse::add(const ForcesBetween& now, double t_s) {
   ++samples;
   end_t_s = t_s;
   end_balance = now.balance;
-  for (PairCourse& course : pairs) course.end_on_soft_N = glm::dvec3(0.0);
+  for (PairCourse& course : pairs) {
+    course.end_on_soft_N = glm::dvec3(0.0);
+    if (keep_every) course.every_N.push_back(0.0);
+  }
   for (const PairForce& force : now.pairs) {
-    auto found = std::find_if(pairs.begin(), pairs.end(),
-                              [&](const PairCourse& course) { return course.pair == force.pair; });
-    if (found == pairs.end()) {
-      const auto order = [](const ObjectPair& p) { return std::tuple(p.soft, p.kind, p.other); };
-      found = std::find_if(pairs.begin(), pairs.end(),
-                           [&](const PairCourse& course) { return order(force.pair) < order(course.pair); });
-      found = pairs.insert(found, PairCourse{.pair = force.pair});
-    }
-    ++found->samples;
-    found->end_on_soft_N = force.on_soft_N;
+    PairCourse& course = course_of(force.pair);
+    ++course.samples;
+    course.end_on_soft_N = force.on_soft_N;
+    const double size_N =
+        force.on_soft_N ? glm::length(*force.on_soft_N) : std::numeric_limits<double>::quiet_NaN();
+    if (keep_every) course.every_N.back() = size_N;
     if (!force.on_soft_N) continue;
-    ++found->known_samples;
-    const double size_N = glm::length(*force.on_soft_N);
-    if (size_N <= found->max_N) continue;
-    found->max_N = size_N;
-    found->max_t_s = t_s;
+    ++course.known_samples;
+    if (size_N <= course.max_N) continue;
+    course.max_N = size_N;
+    course.max_t_s = t_s;
   }
 }
 

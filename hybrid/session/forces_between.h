@@ -54,14 +54,20 @@ struct PairCourse {
   std::optional<glm::dvec3> end_on_soft_N{};  // at the last sample; 0 if the pair does not touch then
   // Samples in which the pair touches, and those of them with a known force.
   std::uint64_t samples = 0, known_samples = 0;
+  // [sample] force (N); 0: the pair does not touch; NaN: not known. Filled with ForcesCourse::keep_every.
+  std::vector<double> every_N{};
 };
 
 struct ForcesCourse {
+  bool keep_every = false;  // fill PairCourse::every_N
   std::uint64_t samples = 0;
   double end_t_s = 0.0;
   std::vector<PairCourse> pairs;          // pairs that touch at any sample, in the order of objects
   std::vector<ForceBalance> end_balance;  // [soft]
   void add(const ForcesBetween& now, double t_s);
+
+ private:
+  PairCourse& course_of(const ObjectPair& pair);
 };
 
 }  // namespace hybrid

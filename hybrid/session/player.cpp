@@ -119,7 +119,7 @@ void Player::keep(device::DeviceFault fault) noexcept {
 
 bool Player::advance(const PlayRequest& request, const device::ServoInput& input) noexcept {
   held_.store(request.hold, std::memory_order_release);
-  if (request.hold) return false;
+  if (request.hold != 0) return false;
   take_edits();
   if (!tick_is_due(request)) return false;
   steer(request);
@@ -149,6 +149,19 @@ void Player::snapshot(Snapshot& out) const {
   } else {
     fill_moved(*built_.world, *built_.state, out);
   }
+}
+
+std::vector<PairPress> Player::presses() const {
+  const auto rigid = static_cast<std::uint32_t>(built_.world->rigid.size());
+  std::vector<PairPress> out;
+  for (const PairForce& force : forces_between(*built_.world, *built_.state).pairs) {
+    PairPress press{.soft = rigid + force.pair.soft};
+    if (force.pair.kind == ObjectPair::Kind::rigid) press.other = force.pair.other;
+    if (force.pair.kind == ObjectPair::Kind::soft) press.other = rigid + force.pair.other;
+    if (force.on_soft_N) press.force_N = glm::length(*force.on_soft_N);
+    out.push_back(press);
+  }
+  return out;
 }
 
 Recording Player::recording(const std::string& scene_text) const {

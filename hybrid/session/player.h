@@ -20,7 +20,9 @@ namespace hybrid {
 // that happens once is a counter.
 struct PlayRequest {
   bool dragging = false, paused = false;
-  bool hold = false;               // pauses and takes no edit, so that the window's thread may read the state
+  // If not 0: pauses and takes no edit, so that the window's thread may read the state. Each pause has a
+  // number of its own, so that an earlier one is not taken for it.
+  std::uint32_t hold = 0;
   double speed = 1.0;              // simulated time over real time, 0 to 1; always 1 with a real device
   std::uint32_t restarts = 0;      // counts restarts of the hand's path
   std::uint32_t single_ticks = 0;  // counts single steps while paused
@@ -84,11 +86,13 @@ class Player {
   // Ticks whose figures were dropped because no frame came for too long.
   [[nodiscard]] std::uint64_t unseen_ticks() const noexcept { return samples_.refused(); }
   [[nodiscard]] bool is_real() const noexcept { return simulated_ == nullptr; }
-  // Has the servo thread seen PlayRequest::hold? If so it leaves the state alone.
-  [[nodiscard]] bool held() const noexcept { return held_.load(std::memory_order_acquire); }
+  // PlayRequest::hold as the servo thread saw it last. While it is not 0 that thread leaves the state alone.
+  [[nodiscard]] std::uint32_t held() const noexcept { return held_.load(std::memory_order_acquire); }
   // The session so far. Call only while held, or after the session. Throws std::runtime_error if the session
   // is longer than kMostRecorded_s.
   [[nodiscard]] Recording recording(const std::string& scene_text) const;
+  // The forces between objects now. Call only while held, or without a servo loop.
+  [[nodiscard]] std::vector<PairPress> presses() const;
 
   [[nodiscard]] double t_s() const noexcept { return static_cast<double>(ticks_) * dt_s_; }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }
@@ -120,7 +124,7 @@ class Player {
   std::vector<Edit> applied_;
   SpscRing<Edit> edits_{kEditsWaiting};
   TickSamples samples_{kSamples};
-  std::atomic<bool> held_{false};
+  std::atomic<std::uint32_t> held_{0};
 };
 
 }  // namespace hybrid

@@ -136,8 +136,10 @@ nlohmann::ordered_json budget_json(const BuiltScene& built, const ForceError& er
                            {"within_1_jnd_after_s", nullptr},
                            {"verdict", in_words(error)}};
   if (error.within_after_s) j["within_1_jnd_after_s"] = *error.within_after_s;
-  j["reference"] = error.all.samples > 0 ? fmt::format("the same path, {} times slower", kSlower)
-                                         : "not measured: " + error.not_measured;
+  const bool known = error.all.samples > 0;
+  j["reference"] = known ? reference_words(error) : "not measured: " + error.not_measured;
+  j["slower"] = known ? nlohmann::ordered_json(error.slower) : nlohmann::ordered_json(nullptr);
+  j["wide_patches"] = error.wide_patches;
   return j;
 }
 
@@ -149,8 +151,7 @@ std::string range_words(const char* name, const ErrorRange& range) {
 
 std::string error_words(const ForceError& error) {
   if (error.all.samples == 0) return fmt::format("force error of tissue: {}\n", in_words(error));
-  return fmt::format("force error of tissue, against the same path {} times slower: {}\n", kSlower,
-                     in_words(error)) +
+  return fmt::format("force error of tissue, against {}: {}\n", reference_words(error), in_words(error)) +
          range_words("moving", error.moving) + range_words("still", error.still);
 }
 

@@ -106,6 +106,8 @@ class Run {
     result_.dt_s = dt_;
     if (const auto most = static_cast<std::uint64_t>(std::max(options.between_samples, 0)); most > 0)
       between_every_ = std::max<std::uint64_t>(1, (ticks_ + most - 1) / most);
+    result_.between.keep_every = options.between_every_tick && !realtime_;
+    if (result_.between.keep_every) between_every_ = 1;
     clearance_every_ = std::max<std::uint64_t>(1, ticks_ / kClearances);
     if (options.keep_recording) result_.recording.reserve(ticks_);
     result_.edits.reserve(options.edits.size());
@@ -148,7 +150,7 @@ class Run {
     if (relaxation) result_.relaxation_s = relaxation->busy_s();
     relaxation.reset();
     result_.async_results = state_.async.results;
-    if (options_.between_samples > 0 && ticks_done_ > 0) measure_between(ticks_done_ - 1);
+    if (between_every_ > 0 && ticks_done_ > 0) measure_between(ticks_done_ - 1);
     result_.end = served.end;
     result_.device_messages = std::move(served.messages);
     result_.ticks = ticks_done_;
@@ -186,7 +188,7 @@ class Run {
       if (course_ != nullptr) keep_in_course(felt);
       if (options_.keep_picture && tick % kMomentEvery == 0) maybe_keep_snapshot(felt, tick);
       if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
-      if (options_.between_samples > 0 && tick % between_every_ == 0) measure_between(tick);
+      if (between_every_ > 0 && tick % between_every_ == 0) measure_between(tick);
       if (options_.progress && tick % 64 == 0) report_progress(tick);
     }
     return {.force_N = felt.force_N, .go_on = ticks_done_ < ticks_};
@@ -293,7 +295,7 @@ class Run {
   FeltMaterials felt_;
   LatencyHistogram late_us_;
   std::chrono::steady_clock::time_point last_report_ = std::chrono::steady_clock::now();
-  std::uint64_t clearance_every_ = 1, between_every_ = 1;
+  std::uint64_t clearance_every_ = 1, between_every_ = 0;  // between_every_ = 0: never
   std::uint64_t ticks_ = 0, ticks_done_ = 0, hash_ = kHashBegin;
   std::size_t next_edit_ = 0;
   double sum_force2_ = 0.0, best_score_ = 0.0;
@@ -389,12 +391,13 @@ SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOp
   ForceCourse course;
   SessionResult result = Run(scene, *built.world, *built.state, options, &course).run();
   begin_session(scene, *built.world, *begin, result.start_m);
-  result.error = compare_with_slow_run(*built.world, *begin, course,
-                                       {.dt_s = result.dt_s,
-                                        .floor_N = jnd_floor_N(scene),
-                                        .most = options.reference_samples,
-                                        .async_relaxation = options.async_relaxation,
-                                        .progress = keep_going(options.progress)});
+  SlowRunOptions slow = slow_run_options(options.reference);
+  slow.dt_s = result.dt_s;
+  slow.floor_N = jnd_floor_N(scene);
+  slow.most = options.reference_samples;
+  slow.async_relaxation = options.async_relaxation;
+  slow.progress = keep_going(options.progress);
+  result.error = compare_with_slow_run(*built.world, *begin, course, slow);
   return result;
 }
 

@@ -54,11 +54,12 @@ struct SessionOptions {
   // Greatest number of moments, evenly spread, at which the forces between objects are computed. They are
   // also computed at the end; in real time, only there.
   int between_samples = 0;
-  bool keep_picture = false;  // keep the snapshot with the most contact
+  bool between_every_tick = false;  // at every tick instead, and keep each pair's force; not in real time
+  bool keep_picture = false;        // keep the snapshot with the most contact
   // Greatest number of ticks, evenly spread, whose forces are compared with those of a slow run
-  // (force_error.h). The slow run takes up to kSlower times as long as the session. In real time nothing is
-  // compared.
+  // (force_error.h), and how carefully that run is played. In real time nothing is compared.
   int reference_samples = 0;
+  Reference reference = Reference::quick;
   // Clocks, counters and path begin as if this many ticks had passed, so that a soft start is over. The
   // forces do not depend on this number.
   std::uint64_t start_ticks = 0;

@@ -8,6 +8,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <span>
 
+#include "hybrid/snapshot/drawn_relief.h"
 #include "hybrid/snapshot/materials_of_labels.h"
 
 namespace hybrid {
@@ -146,7 +147,10 @@ DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::s
                    .max_force_N = world.limits.max_force_N,
                    .editable = editable_values(world, *built.state)};
   for (const RigidObject& object : world.rigid) {
-    drawn.objects.push_back({object.name, false, *object.drawn});
+    const auto& texture = object.feel.texture;
+    drawn.objects.push_back(
+        {object.name, false,
+         texture ? with_relief(*object.drawn, *texture, object.feel.texture_share) : *object.drawn});
     for (glm::dvec3& v : drawn.objects.back().surface.vertices) v = object.to_scene(v);
   }
   for (std::size_t o = 0; o < world.soft.size(); ++o) {

@@ -98,6 +98,13 @@ struct SoftDent {
 // [object][vertex of its surface] displacement (scene frame, meters); empty for a rigid object.
 using MovedSurfaces = std::vector<std::vector<glm::vec3>>;
 
+// The force of two objects of DrawnScene::objects on one another, or of a soft object's anchors on it.
+struct PairPress {
+  static constexpr std::uint32_t kAnchors = 0xFFFFFFFFU;
+  std::uint32_t soft = 0, other = kAnchors;
+  std::optional<double> force_N{};  // empty: not known
+};
+
 struct Snapshot {
   std::uint64_t tick = 0;
   double t_s = 0.0;
@@ -114,7 +121,8 @@ struct Snapshot {
   std::vector<SoftDent> inside{};
   std::vector<RigidPlace> rigid_place;  // [object]; if shorter: further objects have not moved
   double tick_us = 0.0;
-  std::vector<double> values{};  // present values of DrawnScene::editable, SI
+  std::vector<PairPress> presses{};  // pairs that touch; filled between ticks, if anyone asks for them
+  std::vector<double> values{};      // present values of DrawnScene::editable, SI
 
   [[nodiscard]] RigidPlace place_of(std::size_t object) const {
     return object < rigid_place.size() ? rigid_place[object] : RigidPlace{};

@@ -10,6 +10,9 @@ namespace hybrid {
 namespace {
 
 constexpr double punch_height = 3.0;  // height of the body above the face, in radii
+// Distance of the tool's disc from the tool towards the eye, in radii of the disc. The surface that the tool
+// lies on does not cut the disc if the eye is more than 20° above the surface.
+constexpr double disc_nearer = 2.0;
 
 glm::mat4 placed(const glm::dvec3& at, const glm::dmat3& axes) {
   glm::dmat4 m(axes);
@@ -79,7 +82,8 @@ glm::mat4 place_rigid(const RigidPlace& place, const glm::dvec3& origin_m) {
 glm::mat4 place_tool_disc(const DrawnScene& scene, const glm::dvec3& at_m, const Camera& camera,
                           const glm::dvec3& origin_m) {
   const double r = std::max(1.8 * scene.tool_radius_m, 0.015 * camera.view_height_m());
-  return placed(at_m - origin_m, {camera.right() * r, camera.up() * r, camera.toward_eye() * r});
+  const glm::dvec3 middle = at_m + disc_nearer * r * camera.toward_eye();
+  return placed(middle - origin_m, {camera.right() * r, camera.up() * r, camera.toward_eye() * r});
 }
 
 }  // namespace hybrid

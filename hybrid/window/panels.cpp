@@ -106,6 +106,16 @@ std::string object_name(const DrawnScene& scene, std::uint32_t object) {
   return object < scene.objects.size() ? scene.objects[object].name : std::string();
 }
 
+// The format of a slider's number: three digits at least, and never an exponent for a large number.
+std::string number_format(float shown) {
+  return shown >= 99.95F ? "%.0f" : shown >= 9.995F ? "%.1f" : shown >= 0.9995F ? "%.2f" : "%.3g";
+}
+
+bool has_soft(const DrawnScene& scene) {
+  return std::any_of(scene.objects.begin(), scene.objects.end(),
+                     [](const DrawnObject& object) { return object.soft; });
+}
+
 std::string words_of_value(EditedQuantity quantity) {
   switch (quantity) {
     case EditedQuantity::coupling_stiffness:
@@ -223,13 +233,45 @@ void Panels::draw_objects(const Pen& pen, const DrawnScene& scene, const Snapsho
   ImGui::EndTable();
 }
 
+// The rows keep their order and number while the tool moves, so that a reader can follow one of them.
+void Panels::draw_presses(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                          const PanelFrame& frame) const {
+  if (frame.notes.real_device && !frame.state.paused) {
+    ImGui::TextDisabled("Pause to see them.");
+    return;
+  }
+  if (snapshot.presses.empty()) {
+    ImGui::TextDisabled("None: no tissue is pressed.");
+    return;
+  }
+  constexpr int most_rows = 6;
+  const int rows = std::min(static_cast<int>(snapshot.presses.size()), most_rows);
+  const float height = static_cast<float>(rows) * (ImGui::GetTextLineHeight() + 0.35F * pen.em);
+  if (!ImGui::BeginTable("presses", 2, ImGuiTableFlags_ScrollY, {0.0F, height + 0.2F * pen.em})) return;
+  ImGui::TableSetupColumn("pair", ImGuiTableColumnFlags_WidthStretch);
+  ImGui::TableSetupColumn("force", ImGuiTableColumnFlags_WidthFixed, pen.width("not known"));
+  for (const PairPress& press : snapshot.presses) {
+    const std::string other =
+        press.other == PairPress::kAnchors ? "its anchors" : object_name(scene, press.other);
+    const std::string force = press.force_N ? force_text(*press.force_N) : "not known";
+    ImGui::TableNextRow();
+    ImGui::TableNextColumn();
+    ImGui::TextUnformatted(
+        pen.fit(object_name(scene, press.soft) + " – " + other, ImGui::GetContentRegionAvail().x).c_str());
+    ImGui::TableNextColumn();
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ImGui::GetContentRegionAvail().x - pen.width(force));
+    ImGui::TextUnformatted(force.c_str());
+  }
+  ImGui::EndTable();
+}
+
 void Panels::draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
                          PanelResult& result) {
   const double unit = si_of_unit(value.quantity);
   const std::string unit_words(unit_of(value.quantity));
-  const std::string format = "%.3g" + (unit_words.empty() ? "" : " " + unit_words);
   label_beside(pen, words_of_value(value.quantity));
   float shown = moved_ == index ? moved_to_ : static_cast<float>(now / unit);
+  const std::string format = number_format(shown) + (unit_words.empty() ? "" : " " + unit_words);
   const int flags = ImGuiSliderFlags_AlwaysClamp | (value.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   ImGui::PushID(static_cast<int>(index));
   const bool changed = ImGui::SliderFloat("##value", &shown, static_cast<float>(value.usual.low / unit),
@@ -343,6 +385,10 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
       ImGui::SetWindowFocus();
     if (open_section("Session")) draw_session(frame, snapshot, result);
     if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
+    if (has_soft(scene) && open_section("Forces between objects")) {
+      result.wants_presses = true;
+      draw_presses(pen, scene, snapshot, frame);
+    }
     const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
     if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
     if (open_section("View")) draw_view(pen, scene, frame, result);

@@ -36,7 +36,8 @@ struct PanelFrame {
 
 struct PanelResult {
   std::vector<ViewAction> actions;
-  bool wants_text = false;  // a control takes typed text, so keys are not shortcuts
+  bool wants_text = false;     // a control takes typed text, so keys are not shortcuts
+  bool wants_presses = false;  // the list of forces between objects is open
 };
 
 class Panels final : public OverlayPanel {
@@ -54,6 +55,8 @@ class Panels final : public OverlayPanel {
   void draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const;
   void draw_objects(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                     const PanelFrame& frame, PanelResult& result) const;
+  void draw_presses(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                    const PanelFrame& frame) const;
   void draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const PanelFrame& frame,
                    PanelResult& result);
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,

@@ -115,7 +115,7 @@ struct Window::State {
   std::optional<glm::dvec3> goal_m;
   ViewState user;
   UiInput input;
-  bool wants_text = false;  // the panel takes typed text
+  bool wants_text = false, wants_presses = false;  // as in PanelResult
   TickHistory history;
   Panels panels;
   std::deque<ScriptEvent> events;
@@ -319,6 +319,7 @@ struct Window::State {
     const PanelResult asked = panels.take_result();
     for (const ViewAction& action : asked.actions) hybrid::act(user, action);
     wants_text = asked.wants_text;
+    wants_presses = asked.wants_presses;
     input.end_frame();
   }
 
@@ -421,6 +422,7 @@ WindowInput Window::take_input() {
   State& s = *state_;
   return {.dragged_goal_m = s.goal_m,
           .paused = s.user.paused,
+          .wants_presses = s.wants_presses,
           .speed = s.user.speed,
           .restarts = s.user.restarts,
           .single_ticks = s.user.single_ticks,

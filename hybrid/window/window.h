@@ -28,6 +28,7 @@ struct WindowInput {
   // Goal of the tool while it is dragged (scene's frame); empty: no drag.
   std::optional<glm::dvec3> dragged_goal_m;
   bool paused = false;
+  bool wants_presses = false;  // the frame shows Snapshot::presses
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
   // ---- since the last call ----

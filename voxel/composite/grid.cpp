@@ -160,6 +160,21 @@ glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3
   return result;
 }
 
+void CompositeGrid::reserve_like(const CompositeGrid& original) {
+  const auto reserve = [](auto& list, const auto& like) { list.reserve(like.capacity()); };
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    const Level& like = original.levels_[l];
+    reserve(levels_[l].ghosts, like.ghosts);
+    reserve(levels_[l].ghost_neighbours, like.ghost_neighbours);
+    reserve(levels_[l].correction_springs, like.correction_springs);
+    reserve(levels_[l].obstacle_nodes, like.obstacle_nodes);
+  }
+  reserve(pressed_, original.pressed_);
+  reserve(beside_rigid_, original.beside_rigid_);
+  reserve(obstacle_bounds_, original.obstacle_bounds_);
+  reserve(supporting_bounds_, original.supporting_bounds_);
+}
+
 void CompositeGrid::find_chains_to_anchors() {
   if (material_.has_scattered_anchors()) links_to_anchor_ = material_.links_to_anchors();
 }

@@ -70,6 +70,9 @@ class CompositeGrid {
   // Call it before contacts. If anchors are scattered, it counts the links from each surface voxel to the
   // nearest anchor, for clamp_to_supports(). Allocates.
   void find_chains_to_anchors();
+  // Call it after a copy. A copied list has only as much capacity as it has elements, and some lists are cut
+  // short at their capacity. So a copy without it would work on other patches. Allocates.
+  void reserve_like(const CompositeGrid& original);
   // Takes the displacements of another grid of the same object, interpolated.
   void interpolate_from(const CompositeGrid& other) noexcept;
 

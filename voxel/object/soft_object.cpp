@@ -79,6 +79,7 @@ std::unique_ptr<SoftObject> SoftObject::copy() const {
   result->relaxation_.copy_from(relaxation_);
   if (grid_) {
     result->grid_ = std::make_unique<CompositeGrid>(*grid_);
+    result->grid_->reserve_like(*grid_);
     if (!obstacles_.empty()) result->grid_->watch_obstacles(result->obstacles_);
     result->near_on_grid_.reserve(near_on_grid_.capacity());
     result->touches_on_grid_.reserve(kMaxTouched);

@@ -135,7 +135,7 @@ TEST_F(Compose, BonesBecomeSurfacesAndTheRestTissueAndEachIsFelt) {
   ASSERT_EQ(ticks.size(), 3U);
   for (const auto& [name, count] : ticks) EXPECT_GT(count, 100U) << name;
   EXPECT_EQ(composed.path.presses.size(), 4U) << "rib, vertebra, liver, spleen";
-  EXPECT_TRUE(composed.path.hidden.empty());
+  EXPECT_TRUE(composed.path.not_pressed.empty());
 }
 
 TEST_F(Compose, TissueThatTouchesNothingRigidIsHeldAndSpecksGo) {

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <numeric>
 #include <set>
 #include <string>
@@ -195,6 +197,29 @@ TEST_F(ComposedTissue, MostOfThePathIsInContactAndEachPressFeelsWhatItNames) {
       EXPECT_GT(material.max_force_N, 0.0);
     }
   }
+}
+
+// ---- parts that the path does not press
+
+// The spleen lies within the liver, so the tool cannot come to it from any side.
+TEST_F(ComposedTissue, APartBehindOthersOnEverySideIsNotPressedAndTheSceneSaysWhy) {
+  const auto text_of = [](const Composed& composed) {
+    std::ifstream in(composed.scene);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  ComposeOptions options =
+      of(tests::volume_of({{{6, 6, 6}, {29, 29, 25}, 1}, {{14, 14, 12}, {21, 21, 19}, 4}}));
+  const Composed composed = hybrid::compose(options);
+  ASSERT_EQ(composed.path.presses.size(), 1U);
+  EXPECT_THAT(composed.path.presses[0].what, HasSubstr("liver"));
+  ASSERT_EQ(composed.path.not_pressed.size(), 1U);
+  EXPECT_EQ(composed.path.not_pressed[0].what, "spleen");
+  EXPECT_TRUE(composed.path.not_pressed[0].hidden);
+  EXPECT_THAT(text_of(composed),
+              HasSubstr("# Not pressed, because others lie in front on every side: spleen\n"));
+  options = of(tests::volume_of(tests::torso()));
+  options.force = true;
+  EXPECT_THAT(text_of(hybrid::compose(options)), Not(HasSubstr("Not pressed")));
 }
 
 }  // namespace

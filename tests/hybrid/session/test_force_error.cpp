@@ -14,10 +14,12 @@ namespace {
 
 class ForceErrorOfRun : public tests::SceneFile {};
 
-hybrid::SessionOptions options(int samples, std::optional<double> seconds = {}) {
+hybrid::SessionOptions options(int samples, std::optional<double> seconds = {},
+                               hybrid::Reference reference = hybrid::Reference::quick) {
   hybrid::SessionOptions options;
   options.seconds = seconds;
   options.reference_samples = samples;
+  options.reference = reference;
   options.async_relaxation = true;
   return options;
 }
@@ -59,10 +61,10 @@ double slow_run_jnd(const std::vector<hybrid::TraceRow>& fast, const std::vector
 }
 
 TEST_F(ForceErrorOfRun, AgreesWithASlowRun) {
-  const auto play = [&](double speed, int samples) {
+  const auto play = [&](double speed, int samples, hybrid::Reference reference = hybrid::Reference::quick) {
     const hybrid::Scene scene = load(beside_a_ball(speed));
     hybrid::BuiltScene built = hybrid::build_scene(scene);
-    return hybrid::run_session(scene, built, options(samples));
+    return hybrid::run_session(scene, built, options(samples, {}, reference));
   };
   const hybrid::SessionResult fast = play(100.0, 1'000'000), slow = play(10.0, 0);
   const double worst = slow_run_jnd(fast.rows, slow.rows, hybrid::kJndFloor_N);
@@ -76,6 +78,58 @@ TEST_F(ForceErrorOfRun, AgreesWithASlowRun) {
   EXPECT_GT(worst, 0.5) << "the scene is meant to show an error";
   EXPECT_LT(fast.error.all.max_jnd, 1.5 * worst);
   EXPECT_GT(fast.error.all.max_jnd, worst / 1.5);
+  const hybrid::SessionResult full = play(100.0, 1'000'000, hybrid::Reference::full);
+  EXPECT_EQ(fast.error.slower, hybrid::kQuickSlower);
+  EXPECT_EQ(full.error.slower, hybrid::kSlower);
+  EXPECT_EQ(full.error.all.samples, fast.error.all.samples) << "the same ticks are compared";
+  EXPECT_LT(full.error.all.max_jnd, 1.2 * worst);
+  EXPECT_GT(full.error.all.max_jnd, worst / 1.2);
+}
+
+// The reference of shipped scenes: the quick one finds the error of the full one within a factor of 1.5, and
+// plays at most three ticks for one of the session.
+TEST(ForceErrorOfScenes, QuickAgreesWithFull) {
+  for (const char* name : {"cube", "tissue-on-bone", "edge-of-bone"}) {
+    const hybrid::Scene scene =
+        hybrid::load_scene(tests::source_folder / "scenes" / (std::string(name) + ".toml"));
+    const auto play = [&](hybrid::Reference reference) {
+      hybrid::BuiltScene built = hybrid::build_scene(scene);
+      return hybrid::run_session(scene, built, options(1'000'000, {}, reference)).error;
+    };
+    const hybrid::ForceError quick = play(hybrid::Reference::quick), full = play(hybrid::Reference::full);
+    EXPECT_LT(quick.all.max_jnd, 1.5 * full.all.max_jnd) << name;
+    EXPECT_GT(quick.all.max_jnd, full.all.max_jnd / 1.5) << name;
+    EXPECT_EQ(quick.all.samples, full.all.samples) << name;
+    EXPECT_LT(quick.all.rms_N, 1.5 * full.all.rms_N) << name;
+    EXPECT_GT(quick.all.rms_N, full.all.rms_N / 1.5) << name;
+  }
+}
+
+// While the device is still, the quick reference may stop being slow, but not before the tissue is at rest:
+// the error that it finds at the end of a hold is that of the full reference.
+TEST_F(ForceErrorOfRun, DoesNotRestTooEarly) {
+  const hybrid::Scene scene = load(beside_a_ball(100.0));
+  const auto forces = [&](hybrid::Reference reference) {
+    hybrid::BuiltScene built = hybrid::build_scene(scene), again = hybrid::build_scene(scene);
+    const hybrid::SessionResult session = hybrid::run_session(scene, built, options(0));
+    hybrid::ForceCourse course;
+    for (const hybrid::TraceRow& row : session.rows)
+      course.push_back({row.device_m, row.force_N, row.soft_N > 1e-6});
+    hybrid::SlowRunOptions slow = hybrid::slow_run_options(reference);
+    slow.most = 1;
+    slow.async_relaxation = true;
+    std::vector<glm::dvec3> felt(course.size(), glm::dvec3(0.0));
+    slow.felt = [&felt](std::size_t tick, const glm::dvec3& force_N) { felt[tick] = force_N; };
+    hybrid::begin_session(scene, *again.world, *again.state, session.start_m);
+    (void)hybrid::compare_with_slow_run(*again.world, *again.state, course, slow);
+    return felt;
+  };
+  const std::vector<glm::dvec3> quick = forces(hybrid::Reference::quick),
+                                full = forces(hybrid::Reference::full);
+  ASSERT_EQ(quick.size(), full.size());
+  // The device arrives after 0.1 s, and holds until 0.5 s.
+  for (std::size_t tick = 130; tick < 490; ++tick)
+    EXPECT_LT(hybrid::jnd_of(quick[tick], full[tick], hybrid::kJndFloor_N), 0.5) << "tick " << tick;
 }
 
 TEST(ForceErrorWords, SayHowLongItTakes) {

@@ -4,8 +4,13 @@
 #include "hybrid/session/forces_between.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+#include <sstream>
 
+#include "hybrid/session/trace_file.h"
 #include "tests/hybrid/fixtures/touch.h"
 
 namespace {
@@ -114,6 +119,142 @@ TEST(ForcesBetween, ThatLimitsHideAreUnknown) {
   tests::Touch touch(scene, {0.0, 0.0, 0.022});
   touch.go({0.0, 0.0, 0.006}, 4e-5, 3000);
   expect_unknown_or_balanced(touch);
+}
+
+// ---- the forces of every tick, in a trace ----
+
+// The columns of a CSV file by name. An empty field is NaN.
+std::map<std::string, std::vector<double>> columns_of(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  const auto fields_of = [](const std::string& line) {
+    std::vector<std::string> fields{""};
+    for (const char c : line) {
+      if (c == ',') {
+        fields.emplace_back();
+      } else {
+        fields.back() += c;
+      }
+    }
+    return fields;
+  };
+  std::string line;
+  std::getline(in, line);
+  const std::vector<std::string> names = fields_of(line);
+  std::map<std::string, std::vector<double>> columns;
+  while (std::getline(in, line)) {
+    const std::vector<std::string> fields = fields_of(line);
+    EXPECT_EQ(fields.size(), names.size());
+    for (std::size_t n = 0; n < names.size(); ++n)
+      columns[names[n]].push_back(fields[n].empty() ? std::numeric_limits<double>::quiet_NaN()
+                                                    : std::stod(fields[n]));
+  }
+  return columns;
+}
+
+class PairsInATrace : public tests::SceneFile {
+ protected:
+  // Plays the scene, and writes its trace.
+  hybrid::SessionResult play(const hybrid::Scene& scene, std::optional<double> seconds = {}) {
+    built_ = hybrid::build_scene(scene);
+    hybrid::SessionResult result = hybrid::run_session(
+        scene, built_,
+        {.seconds = seconds, .between_samples = 1, .between_every_tick = true, .progress = {}});
+    hybrid::save_trace(folder_ / "trace.csv", result.rows,
+                       hybrid::pair_columns(*built_.world, result.between));
+    columns_ = columns_of(folder_ / "trace.csv");
+    return result;
+  }
+  hybrid::Scene shipped(const std::string& name) const {
+    return hybrid::load_scene(tests::source_folder / "scenes" / (name + ".toml"));
+  }
+  hybrid::BuiltScene built_;
+  std::map<std::string, std::vector<double>> columns_;
+};
+
+// Numbers in a trace have seven digits.
+constexpr double kDigits = 1e-6;
+
+TEST_F(PairsInATrace, AgreeWithTheReport) {
+  for (const char* name : {"tissue-on-bone", "two-soft", "cube"}) {
+    const hybrid::SessionResult result = play(shipped(name));
+    ASSERT_FALSE(result.between.pairs.empty()) << name;
+    EXPECT_EQ(result.between.samples, result.rows.size());
+    const auto shown = hybrid::pair_columns(*built_.world, result.between);
+    ASSERT_EQ(shown.size(), result.between.pairs.size());
+    for (std::size_t n = 0; n < shown.size(); ++n) {
+      const hybrid::PairCourse& pair = result.between.pairs[n];
+      ASSERT_TRUE(columns_.contains(shown[n].name)) << shown[n].name;
+      const std::vector<double>& column = columns_[shown[n].name];
+      ASSERT_EQ(column.size(), result.rows.size());
+      double most_N = 0.0;
+      std::uint64_t unknown = 0, touching = 0;
+      for (const double force_N : column) {
+        unknown += std::isnan(force_N) ? 1 : 0;
+        touching += force_N > 0.0 ? 1 : 0;
+        if (force_N > most_N) most_N = force_N;
+      }
+      EXPECT_NEAR(most_N, pair.max_N, kDigits * pair.max_N) << shown[n].name;
+      const auto at = static_cast<std::size_t>(std::llround(pair.max_t_s / result.dt_s));
+      EXPECT_EQ(column[at], most_N) << shown[n].name;
+      EXPECT_EQ(unknown, pair.samples - pair.known_samples) << shown[n].name;
+      EXPECT_LE(touching, pair.known_samples);
+      if (pair.end_on_soft_N) {
+        EXPECT_NEAR(column.back(), glm::length(*pair.end_on_soft_N), kDigits * pair.max_N);
+      }
+    }
+  }
+}
+
+TEST_F(PairsInATrace, ChangeNothingInTheSession) {
+  const hybrid::SessionResult with = play(shipped("tissue-on-bone"));
+  hybrid::BuiltScene built = hybrid::build_scene(shipped("tissue-on-bone"));
+  const hybrid::SessionResult without =
+      hybrid::run_session(shipped("tissue-on-bone"), built, {.seconds = {}, .progress = {}});
+  EXPECT_EQ(with.state_hash, without.state_hash);
+  EXPECT_TRUE(without.between.pairs.empty());
+  EXPECT_TRUE(hybrid::pair_columns(*built.world, without.between).empty());
+}
+
+// A trace is also a path of the hand. The new columns must not be taken for a part of it, whatever the
+// objects' names.
+TEST_F(PairsInATrace, AreNoPartOfThePathThatATraceIs) {
+  hybrid::Scene scene = shipped("tissue-on-bone");
+  scene.soft[0].name = "tool, position x";
+  const hybrid::SessionResult result = play(scene);
+  ASSERT_TRUE(columns_.contains("between_tool_ position x_anchors_N"));
+  const auto path = device::make_path(device::CsvPath{.file = folder_ / "trace.csv"});
+  for (std::size_t n = 0; n < result.rows.size(); n += 100)
+    EXPECT_LE(glm::distance(path->position(result.rows[n].t_s), result.rows[n].device_m), 1e-9);
+}
+
+// A weight at rest on tissue presses on it with m g before the tool comes.
+TEST_F(PairsInATrace, OfAWeightAtRestIsItsWeight) {
+  const hybrid::SessionResult result = play(shipped("dropped-weight"), 1.4);
+  const hybrid::FreeBody& body = built_.world->rigid[0].motion.free_body();
+  const double weight_N = body.mass.mass_kg * glm::length(body.gravity_m_per_s2);
+  ASSERT_EQ(result.contact_ticks, 0U);
+  EXPECT_NEAR(columns_["between_block_weight_N"].back(), weight_N, 0.02 * weight_N);
+  EXPECT_NEAR(columns_["between_block_anchors_N"].back(), weight_N, 0.02 * weight_N);
+  EXPECT_EQ(columns_["between_block_weight_N"].front(), 0.0);
+}
+
+// A plate presses the whole face of a block without lateral contraction, against the anchors on the other
+// side. Then stress and strain are uniform, and the force is E A d / L. The nodes of the lattice are the
+// middles of voxels, so the elastic body is the box between the middles of the outermost voxels.
+TEST_F(PairsInATrace, OfAPlateAndAnchorsAreThoseOfUniformCompression) {
+  constexpr double young_Pa = 8000.0, side_m = 0.018, length_m = 0.018, depth_m = 0.001;
+  const hybrid::Scene scene = load(
+      "format = 1\n[material.gel]\nyoung = 8000\npoisson = 0\n"
+      "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [40, 40, 10]\nposition = [0, 0, 20]\n"
+      "motion = \"path\"\n[rigid.path]\nkind = \"waypoints\"\nspeed = 10\n"
+      "points = [[0, 0, 20], [0, 0, 14, 5]]\n"
+      "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [20, 20, 20]\nspacing = 2\n"
+      "material = \"gel\"\nanchors = { faces = [\"-z\"] }\n[tool]\nradius = 3\n" +
+      tests::unlimited + tests::some_path);
+  play(scene, 3.0);
+  const double exact_N = young_Pa * side_m * side_m * depth_m / length_m;
+  EXPECT_NEAR(columns_["between_block_plate_N"].back(), exact_N, 0.01 * exact_N);
+  EXPECT_NEAR(columns_["between_block_anchors_N"].back(), exact_N, 0.01 * exact_N);
 }
 
 }  // namespace

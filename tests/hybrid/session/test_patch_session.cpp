@@ -404,4 +404,30 @@ TEST_F(GridSession, AClosedPathBesideABoneGivesTheHandNoEnergy) {
   }
 }
 
+// A copied state plays like its original, also where the patches come to tissue that they did not have when
+// the state was copied: here to stiff parts and to the far end of the block, whose nodes are partly outside.
+TEST_F(GridSession, ACopyFeelsTheSame) {
+  const hybrid::Scene scene = load(
+      block("spacing = 1\ninclusions = [{ shape = \"ball\", centre = [14, 6, 24], size = 9, label = 2 }, "
+            "{ shape = \"ball\", centre = [22, -8, 26], size = 7, label = 2 }]\n"
+            "materials = { \"2\" = \"stiff\" }\n"
+            "[[rigid]]\nname = \"wall\"\nprimitive = \"box\"\nsize = [10, 90, 90]\nposition = [39, 0, 0]\n"));
+  const glm::dvec3 start(-0.020, -0.018, 0.045);
+  tests::Touch original(scene, start), copied(scene, start);
+  copied.built.state = hybrid::copy_state(*copied.built.world, *copied.built.state);
+  hybrid::begin_session(scene, copied.world(), copied.state(), start);
+  const auto felt = [](tests::Touch& touch) {
+    std::vector<glm::dvec3> forces_N;
+    const auto keep = [&](const hybrid::TickResult& tick) { forces_N.push_back(tick.force_N); };
+    touch.go({-0.020, -0.018, 0.037}, 2e-4, 10, keep);
+    touch.go({0.014, 0.006, 0.036}, 2e-4, 10, keep);
+    touch.go({0.026, -0.008, 0.036}, 2e-4, 10, keep);
+    return forces_N;
+  };
+  const std::vector<glm::dvec3> expected = felt(original), of_copy = felt(copied);
+  ASSERT_EQ(expected.size(), of_copy.size());
+  EXPECT_GT(glm::length(expected.back()), 0.1);
+  for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_EQ(expected[n], of_copy[n]) << "tick " << n;
+}
+
 }  // namespace

@@ -112,8 +112,8 @@ TEST_F(PlayerOf, PausesTicksOnceAndSlowsDown) {
   EXPECT_NEAR(static_cast<double>(player_->ticks()), 113.0, 1.0);
   steps(1000, {.speed = 0.01, .single_ticks = 3});
   EXPECT_NEAR(static_cast<double>(player_->ticks()), 123.0, 1.0);
-  steps(10, {.hold = true});
-  EXPECT_TRUE(player_->held());
+  steps(10, {.hold = 7});
+  EXPECT_EQ(player_->held(), 7U);
   expect_replays();
   hybrid::TickSample sample;
   std::uint64_t samples = 0;
