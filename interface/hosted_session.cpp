@@ -68,7 +68,6 @@ HostedSession::HostedSession(SceneSource source, const HostOptions& options)
       options_(options),
       period_s_(1.0 / options.rate_hz.value_or(source_.scene.rate_hz)),
       work_share_(period_s_) {
-  const hybrid::ScopedFlushToZero flushed;
   source_.scene = at_rate(std::move(source_.scene), options.rate_hz);
   built_ = hybrid::build_scene(source_.scene);
   hybrid::note_relaxation(source_.scene, built_, options.relaxation != Relaxation::tick);

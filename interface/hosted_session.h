@@ -46,7 +46,7 @@ class HostedSession {
  public:
   static constexpr std::size_t kEditsWaiting = 256, kMostEdits = 100'000;
 
-  // Builds the world. Throws hybrid::SceneError.
+  // Builds the world. The caller has switched flush-to-zero on. Throws hybrid::SceneError.
   HostedSession(SceneSource source, const HostOptions& options);
 
   // ---- constant after construction ----

@@ -49,6 +49,9 @@ TRACE = np.dtype(
     ]
 )
 
+_ROW = np.dtype((np.record, TRACE))  # its rows have attributes
+_Row = ctypes.c_uint32 * (TRACE.itemsize // 4)  # memory of a row; its first word is the size
+
 _RELAXATIONS = {"in-call": 0, "thread": 1, "tick": 2}
 
 
@@ -182,11 +185,12 @@ def _need(code: int) -> None:
         raise Error(_library.hybrid_code_name(code).decode(), _library.hybrid_error_text().decode("utf-8", "replace"))
 
 
-def _place(position: ArrayLike) -> NDArray[np.float64]:
-    at = np.ascontiguousarray(position, dtype=np.float64)
-    if at.shape != (3,):
-        raise Error("HYBRID_BAD_VALUE", f"a position has the shape {at.shape}; pass three numbers x, y, z in meters")
-    return at
+def _place(position: ArrayLike) -> ctypes.Array:
+    """A position for the library. An array of ctypes, because its address costs less than that of one of numpy."""
+    shape = np.shape(position) if not isinstance(position, (tuple, list)) else (len(position),)
+    if shape != (3,):
+        raise Error("HYBRID_BAD_VALUE", f"a position has the shape {shape}; pass three numbers x, y, z in meters")
+    return _vector(*position)
 
 
 def version() -> str:
@@ -339,7 +343,7 @@ class Session:
         """Starts with the tool at a position (m), outside everything rigid. The first tick() or play() does it with
         its first position, if it was not called."""
         at = _place(position)
-        _need(_library.hybrid_begin(self._handle, at.ctypes.data))
+        _need(_library.hybrid_begin(self._handle, at))
         self._begun = True
 
     def tick(
@@ -351,12 +355,11 @@ class Session:
         (w, x, y, z); it is checked, and has no effect on a ball or a punch."""
         at = _place(position)
         if not self._begun:
-            self.begin(at)
+            self.begin(tuple(at))
         turned = (_f64 * 4)(*orientation) if orientation is not None else None
-        row = np.empty(1, TRACE)
-        row["size"] = TRACE.itemsize
-        _need(_library.hybrid_tick(self._handle, at.ctypes.data, turned, self._dt(dt), row.ctypes.data))
-        return row.view(np.recarray)[0]
+        row = _Row(TRACE.itemsize)
+        _need(_library.hybrid_tick(self._handle, at, turned, self._dt(dt), row))
+        return np.frombuffer(row, _ROW)[0]
 
     def play(self, positions: ArrayLike, dt: Optional[float] = None) -> np.recarray:
         """A tick for each of the positions (m), shape (n, 3); returns the trace, shape (n,) of TRACE.

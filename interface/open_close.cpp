@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The C interface: the library, opening, the scene, closing.
-#include <cmath>
+#include <algorithm>
+#include <cstring>
 #include <forward_list>
+#include <iterator>
+#include <limits>
 #include <mutex>
 
-#include "hybrid/session/report.h"
+#include "hybrid/base/flush_to_zero.h"
 #include "interface/handle.h"
 
 namespace c_interface {
@@ -50,6 +53,8 @@ hybrid_code open(const char* where, const hybrid_options* options, hybrid_sessio
   *session = nullptr;
   HostOptions host;
   if (const hybrid_code code = read_options(where, options, host); code != HYBRID_OK) return code;
+  // Host programs differ in how they treat denormal numbers; scenes must not.
+  const hybrid::ScopedFlushToZero flushed;
   return guarded(where, HYBRID_REFUSED, [&] {
     *session = new_handle(std::make_unique<HostedSession>(source(), host));
     return HYBRID_OK;
