@@ -90,6 +90,9 @@ class HostedSession {
   void take_edits() noexcept;
   void keep(double dt_s) noexcept;
 
+  hybrid::SpscRing<hybrid::Edit> edits_{kEditsWaiting};
+  std::uint64_t edits_sent_ = 0;  // of the editor
+
   SceneSource source_;
   HostOptions options_;
   double period_s_;
@@ -97,9 +100,6 @@ class HostedSession {
   std::vector<std::string> notes_;
   std::vector<hybrid::EditableValue> editable_;
   std::optional<HostedSurfaces> surfaces_;
-
-  hybrid::SpscRing<hybrid::Edit> edits_{kEditsWaiting};
-  std::uint64_t edits_sent_ = 0;  // of the editor
 
   bool begun_ = false, live_ = false;
   hybrid::TickResult felt_;
