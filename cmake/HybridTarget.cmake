@@ -35,6 +35,12 @@ function(hybrid_target name)
   endif()
 endfunction()
 
+# hybrid_shareable(NAME): code that a shared library may hold. Without -fno-semantic-interposition g++ would inline no function
+# that another library might replace, which none does.
+function(hybrid_shareable name)
+  target_compile_options(${name} PRIVATE -fPIC -fno-semantic-interposition)
+endfunction()
+
 # hybrid_headers(NAME HEADERS… LINKS …): headers that many rooms include, compiled once; rooms reuse them by name. A source still
 # names each header that it uses: CMAKE_DISABLE_PRECOMPILE_HEADERS builds without them.
 function(hybrid_headers name)
@@ -42,6 +48,7 @@ function(hybrid_headers name)
   file(GENERATE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp CONTENT "// Holds the precompiled headers ${name}.\n")
   add_library(${name} OBJECT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
   hybrid_target(${name})
+  hybrid_shareable(${name})
   target_link_libraries(${name} PRIVATE ${arg_LINKS})
   target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
 endfunction()
@@ -61,6 +68,7 @@ function(hybrid_room path)
   add_library(hybrid_${name} STATIC ${arg_SOURCES})
   add_library(hybrid::${name} ALIAS hybrid_${name})
   hybrid_target(hybrid_${name})
+  hybrid_shareable(hybrid_${name})
   target_link_libraries(hybrid_${name} PUBLIC ${arg_LINKS} PRIVATE ${arg_PRIVATE_LINKS})
   if(arg_COLD)
     target_compile_options(hybrid_${name} PRIVATE $<$<CONFIG:Release>:-O1>)

@@ -29,7 +29,7 @@ inline bool is_header(const SourceFile& file) {
   return file.path.ends_with(".h") || file.path.ends_with(".hpp");
 }
 inline bool is_cpp(const SourceFile& file) {
-  return is_header(file) || file.path.ends_with(".cpp");
+  return is_header(file) || file.path.ends_with(".cpp") || file.path.ends_with(".c");
 }
 inline bool is_in(const SourceFile& file, std::string_view folder) {
   return file.path.starts_with(std::string(folder).append("/"));
@@ -37,8 +37,8 @@ inline bool is_in(const SourceFile& file, std::string_view folder) {
 
 // Whether a person wrote the file: sources, build files, scripts, scenes and documents. Data are left out.
 inline bool is_text(const std::filesystem::path& file) {
-  static const std::set<std::string> kEndings{".cpp",  ".h",   ".hpp",  ".cmake", ".sh",  ".md",
-                                              ".toml", ".txt", ".json", ".yml",   ".yaml"};
+  static const std::set<std::string> kEndings{".cpp",  ".c",   ".h",    ".hpp", ".cmake", ".sh", ".md",
+                                              ".toml", ".txt", ".json", ".yml", ".yaml",  ".py"};
   const std::filesystem::path folder = file.parent_path().filename();
   return kEndings.contains(file.extension().string()) || folder == ".ci" || file.filename() == ".clang-tidy";
 }
@@ -51,7 +51,8 @@ inline std::vector<SourceFile> read_tree() {
     files.push_back({entry.path().lexically_relative(root).generic_string(), lines_of(entry.path())});
   };
   for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(root)) add(entry);
-  for (const char* folder : {"polygon", "voxel", "device", "hybrid", "scenes", "tests", "cmake", ".ci"}) {
+  for (const char* folder :
+       {"polygon", "voxel", "device", "hybrid", "interface", "scenes", "tests", "cmake", ".ci"}) {
     if (!std::filesystem::is_directory(root / folder)) continue;
     for (const std::filesystem::directory_entry& entry :
          std::filesystem::recursive_directory_iterator(root / folder))

@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace tests;
 
-constexpr std::array kParts{"polygon", "voxel", "device", "hybrid"};
-constexpr std::array kFolders{"polygon", "voxel", "device", "hybrid", "scenes", "tests"};
+constexpr std::array kParts{"polygon", "voxel", "device", "hybrid", "interface"};
+constexpr std::array kFolders{"polygon", "voxel", "device", "hybrid", "interface", "scenes", "tests"};
 
 // The file that a line includes; empty if the line is not an #include.
 std::string included_by(std::string_view line) {
@@ -135,6 +135,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"stability", {"plot", "compare", "compose", "stress"}},
         {"validate", {"page", "compare"}},
         {"program", {"bench", "bench/reports", "stability", "tune", "validate", "window"}}}},
+      {"interface", {{"", {}}, {"examples", {}}}},
   };
   return kRooms;
 }
@@ -207,11 +208,22 @@ TEST(HouseRules, FilesAndRoomsAreSmallEnoughToKnow) {
     EXPECT_LE(count, kMostSources) << folder << " has more sources than can be known: split the room";
 }
 
-TEST(HouseRules, NothingButTestsIncludesHybridFromOutside) {
+TEST(HouseRules, OnlyInterfaceAndTestsIncludeHybridFromOutside) {
   for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
     if (!included.starts_with("hybrid/")) return;
-    EXPECT_TRUE(is_in(file, "hybrid") || is_in(file, "tests"))
+    EXPECT_TRUE(is_in(file, "hybrid") || is_in(file, "interface") || is_in(file, "tests"))
         << place(file, line) << "includes " << included;
+  });
+}
+
+// Examples are programs of users: they see the public header alone.
+TEST(HouseRules, NothingIncludesTheInterfaceButItselfAndTests) {
+  for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
+    const bool example = is_in(file, "interface/examples");
+    const bool allowed =
+        !included.starts_with("interface/") || (is_in(file, "interface") && !example) || is_in(file, "tests");
+    EXPECT_TRUE(allowed) << place(file, line) << "includes " << included;
+    EXPECT_FALSE(example && included.starts_with("hybrid/")) << place(file, line) << "includes " << included;
   });
 }
 
@@ -250,7 +262,8 @@ TEST(HouseRules, EverySourceFileNamesItsLicence) {
   for (const SourceFile& file : tree()) {
     const fs::path path = file.path;
     const bool source = is_cpp(file) || path.extension() == ".cmake" || path.extension() == ".sh" ||
-                        path.filename() == "CMakeLists.txt" || path.parent_path() == ".ci";
+                        path.extension() == ".py" || path.filename() == "CMakeLists.txt" ||
+                        path.parent_path() == ".ci";
     if (!source) continue;
     bool found = false;
     for (std::size_t i = 0; i < std::min<std::size_t>(3, file.lines.size()); ++i) {

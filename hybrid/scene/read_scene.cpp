@@ -14,6 +14,7 @@
 #include "hybrid/scene/read_material.h"
 #include "hybrid/scene/read_path.h"
 #include "hybrid/scene/read_rigid.h"
+#include "hybrid/scene/read_scene_text.h"
 #include "hybrid/scene/scene.h"
 #include "hybrid/scene/table_reader.h"
 #include "hybrid/scene/toml_tree.h"
@@ -279,12 +280,11 @@ void read_objects(const SceneSource& source, const TableReader& root, bool mater
   throw SceneError(file, errors.front().place, text);
 }
 
-Scene read_whole(const std::filesystem::path& file) {
+Scene read_whole(const TreeNode& tree, const std::filesystem::path& file) {
   static constexpr std::string_view keys[] = {"format",   "units",  "title", "overlap", "occupancy",
                                               "tool",     "device", "hand",  "safety",  "path",
                                               "material", "rigid",  "soft"};
   static constexpr std::string_view overlaps[] = {"carve", "refuse"};
-  const TreeNode tree = read_tree(file);
   std::vector<ReaderError> errors;
   SceneSource source{file};
   check_format(source, tree);
@@ -355,15 +355,29 @@ std::size_t max_lattice_voxels() {
   return static_cast<std::size_t>(std::min(most, bytes / static_cast<double>(lattice_bytes_per_voxel)));
 }
 
-Scene read_scene(const std::filesystem::path& file) {
+namespace {
+
+// Reads the tree that `tree_of` makes. Every failure becomes a SceneError.
+template <class TreeOf>
+Scene read_from(const std::filesystem::path& file, const TreeOf& tree_of) {
   try {
-    return read_whole(file);
+    return read_whole(tree_of(), file);
   } catch (const std::bad_alloc&) {
     throw SceneError(file, {},
                      "the file needs more memory than there is; name meshes and volumes by their file");
   } catch (const std::filesystem::filesystem_error& error) {
     throw SceneError(file, {}, words(printable(error.what()), "; check the path"));
   }
+}
+
+}  // namespace
+
+Scene read_scene(const std::filesystem::path& file) {
+  return read_from(file, [&file] { return read_tree(file); });
+}
+
+Scene read_scene_text(std::string_view text, const std::filesystem::path& file) {
+  return read_from(file, [&] { return parse_tree(text, file); });
 }
 
 }  // namespace hybrid

@@ -13,6 +13,8 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/whole_file.h"
+#include "hybrid/build/choose_model.h"
+#include "hybrid/scene/read_scene_text.h"
 #include "hybrid/scene/toml_tree.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/work_budget.h"
@@ -71,6 +73,21 @@ std::string read_text(const std::filesystem::path& file) {
   std::ostringstream text;
   text << in.rdbuf();
   return text.str();
+}
+
+// The scene of a recording. Throws std::runtime_error if its file is not as it was, and SceneError.
+Scene recorded_scene(const Recording& recording) {
+  const std::filesystem::path& file = recording.scene_file;
+  if (!file.has_filename()) {
+    Scene scene = read_scene_text(recording.scene_text, file / kNameOfText);
+    choose_models(scene);
+    return scene;
+  }
+  if (read_text(file) == recording.scene_text) return load_scene(file);
+  throw std::runtime_error(
+      fmt::format("{}: the scene is not what was recorded (changed or moved); put the recorded text back, "
+                  "or record again",
+                  printable(file.string(), kLongestPath)));
 }
 
 }  // namespace
@@ -169,13 +186,7 @@ Recording load_recording(const std::filesystem::path& file) {
 
 ReplayResult replay(const Recording& recording, const Progress& progress) {
   set_flush_to_zero();
-  if (read_text(recording.scene_file) != recording.scene_text) {
-    throw std::runtime_error(
-        fmt::format("{}: the scene is not what was recorded (changed or moved); put the recorded text back, "
-                    "or record again",
-                    printable(recording.scene_file.string(), kLongestPath)));
-  }
-  Scene scene = load_scene(recording.scene_file);
+  Scene scene = recorded_scene(recording);
   scene.opened_limits = recording.device;  // the device of the recording may not be connected now
   if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // the driver's rate
   const BuiltScene built = build_scene(scene, progress);
