@@ -93,7 +93,10 @@ void rigid_suite(const BenchCommand& command, std::FILE* words, nlohmann::ordere
     fmt::print(words, "an empty measurement shows {:.3f} us, which is in every time above\n",
                rows.front().timer_overhead_us);
   if (const std::string ratios = bench::ratio_table(rows); !ratios.empty())
-    fmt::print(words, "\nhybrid's own times, and how many times as long the others took (* over a part of the path):\n{}", ratios);
+    fmt::print(
+        words,
+        "\nhybrid's own times, and how many times as long the others took (* over a part of the path):\n{}",
+        ratios);
 }
 
 // `growth`: gets the growth of work with relative deformation.
