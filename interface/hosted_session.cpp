@@ -187,12 +187,12 @@ hybrid::ForceError HostedSession::measure_error(int samples) const {
   const hybrid::ScopedFlushToZero flushed;
   const auto state = hybrid::copy_state(*built_.world, *at_start_);
   hybrid::begin_session(source_.scene, *built_.world, *state, start_m_);
-  return hybrid::compare_with_slow_run(*built_.world, *state, course_,
-                                       {.dt_s = period_s_,
-                                        .floor_N = hybrid::jnd_floor_N(source_.scene),
-                                        .most = samples,
-                                        .async_relaxation = options_.relaxation != Relaxation::tick,
-                                        .progress = {}});
+  hybrid::SlowRunOptions slow = hybrid::slow_run_options(hybrid::Reference::quick);
+  slow.dt_s = period_s_;
+  slow.floor_N = hybrid::jnd_floor_N(source_.scene);
+  slow.most = samples;
+  slow.async_relaxation = options_.relaxation != Relaxation::tick;
+  return hybrid::compare_with_slow_run(*built_.world, *state, course_, slow);
 }
 
 }  // namespace c_interface

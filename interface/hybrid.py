@@ -437,8 +437,8 @@ class Session:
         _need(_library.hybrid_save_recording(self._handle, os.fsencode(file)))
 
     def measure_error(self, samples: int = 200) -> ForceError:
-        """The error of the tissue's force so far, against the same motion played ten times slower. Takes several
-        times as long as the session. Needs record= and error=True."""
+        """The error of the tissue's force so far, against the same motion played five times slower, ten
+        times while the device is still. Takes about twice as long as the session. Needs record= and error=True."""
         found = _ForceError()
         _need(_library.hybrid_measure_error(self._handle, samples, ctypes.byref(found)))
         return ForceError(**{name: getattr(found, name) for name, _ in _ForceError._fields_[1:]})
