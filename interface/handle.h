@@ -82,7 +82,7 @@ inline hybrid_code check_handle(const char* where, const hybrid_session* handle)
   return HYBRID_OK;
 }
 
-// Runs act(session) without claiming a group: for what is constant.
+// Runs act(session) without claiming a group. `act` may only read members that never change.
 template <class Act>
 hybrid_code with_session(const char* where, hybrid_session* handle, const Act& act) noexcept {
   if (const hybrid_code code = check_handle(where, handle); code != HYBRID_OK) return code;

@@ -2,82 +2,27 @@
 // A tick through the C interface allocates nothing, takes no lock, throws nothing and reads no file, refused
 // calls included. This program counts such calls of the shared library while its thread is watched. It also
 // measures the cost of a call.
-#include <dlfcn.h>
 #include <gtest/gtest.h>
-#include <pthread.h>
 #include <time.h>  // NOLINT(modernize-deprecated-headers): clock_gettime() is POSIX
 
 #include <algorithm>
 #include <cstdlib>
 #include <thread>
-#include <utility>
 
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/session/session.h"
+#include "tests/hybrid/fixtures/counted_calls.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/interface/c_session.h"
 
 namespace {
 
-thread_local bool watched = false;
-thread_local std::size_t counted = 0;
-
-void count() noexcept {
-  if (watched) ++counted;
-}
-
-template <class Function>
-Function* next(const char* name) noexcept {
-  const bool was = std::exchange(watched, false);
-  auto* const found = reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
-  watched = was;
-  return found;
-}
-
-}  // namespace
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define COUNTS_CALLS 0  // sanitizers have their own versions
-#else
-#define COUNTS_CALLS 1
-// NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp)
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t number, std::size_t size);
-void* __libc_realloc(void* memory, std::size_t size);
-
-void* malloc(std::size_t size) noexcept {
-  count();
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t number, std::size_t size) noexcept {
-  count();
-  return __libc_calloc(number, size);
-}
-void* realloc(void* memory, std::size_t size) noexcept {
-  count();
-  return __libc_realloc(memory, size);
-}
-int pthread_mutex_lock(pthread_mutex_t* lock) noexcept {
-  static auto* const real = next<int(pthread_mutex_t*)>("pthread_mutex_lock");
-  count();
-  return real(lock);
-}
-[[noreturn]] void __cxa_throw(void* thrown, void* type, void (*destroy)(void*)) {
-  static auto* const real = next<void(void*, void*, void (*)(void*))>("__cxa_throw");
-  count();
-  real(thrown, type, destroy);
-  std::abort();  // __cxa_throw does not return
-}
-}
-// NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp)
-#endif
-
-namespace {
-
+using tests::calls;
+using tests::Calls;
 using tests::CSession;
 using tests::expect_ok;
 using tests::line;
+using tests::watched;
 
 class CTickPath : public tests::SceneFile {
  protected:
@@ -100,7 +45,8 @@ TEST_F(CTickPath, ATickAllocatesLocksAndThrowsNothing) {
     const auto path_m = line({0.0, 0.0, 0.02}, {0.0, 0.0, 0.003}, 400);
     std::vector<hybrid_felt> felt(path_m.size());
     felt.front().size = sizeof(hybrid_felt);
-    std::size_t found = 0, failed = 0;
+    Calls found;
+    std::size_t failed = 0;
     bool touched = false;
     std::thread([&] {
       watched = true;
@@ -116,11 +62,11 @@ TEST_F(CTickPath, ATickAllocatesLocksAndThrowsNothing) {
           hybrid_tick(session.get(), &path_m.front().x, nullptr, -1.0, nullptr) == HYBRID_BAD_VALUE ? 0 : 1;
       failed += hybrid_tick(nullptr, nullptr, nullptr, 1e-3, nullptr) == HYBRID_NULL_ARGUMENT ? 0 : 1;
       watched = false;
-      found = counted;
+      found = calls;
     }).join();
     EXPECT_EQ(failed, 0U);
     EXPECT_TRUE(touched);
-    EXPECT_EQ(found, 0U) << "relaxation " << relaxation;
+    EXPECT_EQ(found, Calls{}) << "relaxation " << relaxation;
   }
 }
 

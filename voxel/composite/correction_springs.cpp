@@ -69,6 +69,7 @@ void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) co
         bool any = false;
         // Links are compared by their tissue's shape, anchors by their weight over the tissue's stiffness.
         const float stiffness = stiffness_at(coarse, n);
+        if (stiffness == 0.0F) continue;  // anchors alone hold the node
         for (std::size_t d = 0; d < 3; ++d) {
           const auto& weight = shape_weights(coarse)[d];
           const float own =

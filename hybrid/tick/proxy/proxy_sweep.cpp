@@ -260,9 +260,9 @@ class Sweeper {
         end_way_before(first);
         return true;
       }
-      // first_in_the_way() found the element by the plane that is perpendicular to the line from the ball to
-      // the element's closest point. That plane tells where the way meets the element. The step is bounded by
-      // the plane of the element's face instead, because on that plane the proxy arrives in one step.
+      // An element has two planes. first_in_the_way() used the plane across its closest point, which tells
+      // where the way meets the element. The step is bounded by the plane of the element's face, because the
+      // proxy comes to rest on that plane in one step.
       make_plane(first);
       held_[held_count_++] = first;
       state_.scratch.planes.push_back(in_scene(first));

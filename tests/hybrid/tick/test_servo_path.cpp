@@ -1,27 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // After the build, a tick allocates nothing, takes no lock, waits for no thread, throws nothing, and neither
 // reads nor writes a file. This program counts all such calls while its thread is watched.
-#include <dlfcn.h>
 #include <gtest/gtest.h>
-#include <pthread.h>
-#include <sched.h>
-#include <semaphore.h>
-#include <time.h>  // NOLINT(modernize-deprecated-headers): nanosleep() is POSIX
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cstdarg>
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <mutex>
-#include <new>
-#include <ostream>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "hybrid/base/flush_to_zero.h"
@@ -30,143 +20,15 @@
 #include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/world/edits.h"
+#include "tests/hybrid/fixtures/counted_calls.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/shared_data.h"
 
 namespace {
 
-struct Calls {
-  std::size_t allocations = 0, locks = 0, waits = 0, throws = 0, files = 0;
-  bool operator==(const Calls&) const = default;
-};
-std::ostream& operator<<(std::ostream& out, const Calls& c) {
-  return out << c.allocations << " allocations, " << c.locks << " locks, " << c.waits << " waits, "
-             << c.throws << " throws, " << c.files << " reads or writes";
-}
-
-thread_local bool watched = false;
-thread_local Calls calls;
-void count(std::size_t Calls::*of) noexcept {
-  if (watched) ++(calls.*of);
-}
-void count() noexcept {
-  count(&Calls::allocations);
-}
-
-// The next definition of the function `name` in the order of the loaded libraries.
-template <class Function>
-Function* next(const char* name) noexcept {
-  const bool was = std::exchange(watched, false);
-  auto* const found = reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
-  watched = was;
-  return found;
-}
-
-}  // namespace
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define COUNTS_CALLS 0  // sanitizers have their own versions
-#else
-#define COUNTS_CALLS 1
-// The GNU C library's names of the functions that are replaced here.
-// NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t number, std::size_t size);
-void* __libc_realloc(void* memory, std::size_t size);
-
-void* malloc(std::size_t size) noexcept {
-  count();
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t number, std::size_t size) noexcept {
-  count();
-  return __libc_calloc(number, size);
-}
-void* realloc(void* memory, std::size_t size) noexcept {
-  count();
-  return __libc_realloc(memory, size);
-}
-
-// These cover std::mutex and its relatives, std::condition_variable and semaphores. std::atomic::wait() calls
-// syscall().
-#define COUNTED(of, result, name, parameters, ...)            \
-  result name parameters noexcept {                           \
-    static auto* const real = next<result parameters>(#name); \
-    count(&Calls::of);                                        \
-    return real(__VA_ARGS__);                                 \
-  }
-COUNTED(locks, int, pthread_mutex_lock, (pthread_mutex_t * lock), lock)
-COUNTED(locks, int, pthread_mutex_trylock, (pthread_mutex_t * lock), lock)
-COUNTED(locks, int, pthread_rwlock_rdlock, (pthread_rwlock_t * lock), lock)
-COUNTED(locks, int, pthread_rwlock_wrlock, (pthread_rwlock_t * lock), lock)
-COUNTED(locks, int, pthread_spin_lock, (pthread_spinlock_t * lock), lock)
-COUNTED(waits, int, sem_wait, (sem_t * semaphore), semaphore)
-COUNTED(waits, int, sched_yield, (), )
-#undef COUNTED
-// These functions are cancellation points, so they may throw.
-#define COUNTED(of, result, name, parameters, ...)            \
-  result name parameters {                                    \
-    static auto* const real = next<result parameters>(#name); \
-    count(&Calls::of);                                        \
-    return real(__VA_ARGS__);                                 \
-  }
-COUNTED(waits, int, pthread_cond_wait, (pthread_cond_t * condition, pthread_mutex_t* lock), condition, lock)
-COUNTED(waits, int, nanosleep, (const timespec* time, timespec* left), time, left)
-COUNTED(files, ssize_t, read, (int file, void* to, std::size_t size), file, to, size)
-COUNTED(files, ssize_t, write, (int file, const void* from, std::size_t size), file, from, size)
-#undef COUNTED
-[[noreturn]] void __cxa_throw(void* thrown, void* type, void (*destroy)(void*)) {
-  static auto* const real = next<void(void*, void*, void (*)(void*))>("__cxa_throw");
-  count(&Calls::throws);
-  real(thrown, type, destroy);
-  std::abort();  // __cxa_throw does not return
-}
-long syscall(long number, ...) noexcept {
-  std::va_list arguments;
-  va_start(arguments, number);
-  std::array<long, 6> a{};
-  for (long& argument : a) argument = va_arg(arguments, long);
-  va_end(arguments);
-  static auto* const real = next<long(long, long, long, long, long, long, long)>("syscall");
-  count(&Calls::waits);
-  return real(number, a[0], a[1], a[2], a[3], a[4], a[5]);
-}
-}
-// NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp,readability-inconsistent-declaration-parameter-name)
-#endif
-
-// Not inlined, because the compiler would report free() of memory from new as a mismatch.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  count();
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t& /*nothrow*/) noexcept {
-  count();
-  return std::malloc(size == 0 ? 1 : size);
-}
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
-  count();
-  const auto step = static_cast<std::size_t>(alignment);
-  if (void* memory = std::aligned_alloc(step, (size / step + 1) * step)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory, std::align_val_t /*alignment*/) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/,
-                                       std::align_val_t /*alignment*/) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/) noexcept {
-  std::free(memory);
-}
-
-namespace {
+using tests::calls;
+using tests::Calls;
+using tests::watched;
 
 constexpr int kTicks = 10'000;
 std::vector<hybrid::EditableValue> values;
