@@ -98,36 +98,6 @@ void CoarseMaterial::add_anchor_face(const Index3& voxel, std::uint8_t d, std::u
   anchor_faces_.push_back(face);
 }
 
-// Breadth-first search from all anchors.
-std::vector<std::uint32_t> CoarseMaterial::links_to_anchors() const {
-  std::vector<std::uint32_t> links(lattice_.surface().size(), std::numeric_limits<std::uint32_t>::max());
-  std::vector<bool> known(lattice_.size());
-  std::vector<VoxelId> front, next;
-  const Grid& g = lattice_.grid();
-  const auto visit = [&](VoxelId v, std::uint32_t away) {
-    known[v] = true;
-    next.push_back(v);
-    const std::uint32_t s = lattice_.surface_number(v);
-    if (s < links.size()) links[s] = away;
-  };
-  for (RowId row = 0; row < g.rows(); ++row) {
-    for (std::uint32_t lanes = lattice_.anchored_lanes(row); lanes != 0; lanes &= lanes - 1)
-      visit(row * kRow + static_cast<VoxelId>(std::countr_zero(lanes)), 0);
-  }
-  for (std::uint32_t away = 1; !next.empty(); ++away) {
-    front.swap(next);
-    next.clear();
-    for (const VoxelId v : front) {
-      for (int d = 0; d < 3; ++d) {
-        for (const VoxelId w : {lattice_.up(v, d), lattice_.down(v, d)}) {
-          if (lattice_.filled(w) && !known[w]) visit(w, away);
-        }
-      }
-    }
-  }
-  return links;
-}
-
 bool CoarseMaterial::anchor_near(const Index3& p, const Index3& q, int span) const noexcept {
   std::size_t m = kFirstAnchorLevel;
   while ((1 << m) < span && m + 1 < levels_.size()) ++m;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "voxel/lattice/link_stiffness.h"
 
@@ -44,28 +45,38 @@ CoarseMaterial::CoarseMaterial(const Lattice& lattice) : lattice_(lattice), dims
     has_thin_links_ = find_thin_link();
   }
   if (is_heterogeneous()) find_stiffness();
+  if (has_own_limits()) add_limits();
   mark_anchors();
   list_anchor_faces();
   const std::size_t widest = index(*std::max_element(dims_.begin(), dims_.end())) + 2 * kMaxCubeEdge;
   voxel_scratch_.reserve(4 * widest);
 }
 
-// The reference stiffness is that of the first surface voxel.
+// The reference is the tissue of the first surface voxel.
 void CoarseMaterial::rank_materials() {
-  std::vector<double> young_Pa{0.0};
-  for (const LinkMaterial& m : lattice_.materials().subspan(1)) young_Pa.push_back(m.young_Pa);
-  std::sort(young_Pa.begin(), young_Pa.end());
-  young_Pa.erase(std::unique(young_Pa.begin(), young_Pa.end()), young_Pa.end());
-  const auto stiffness_of = [this](std::uint8_t label) {
-    return lattice_.materials()[lattice_.material_of(label)].young_Pa;
+  using Tissue = std::pair<double, TissueLimits>;  // modulus (Pa), limits
+  const auto tissue_of = [](const LinkMaterial& m) {
+    return Tissue{m.young_Pa,
+                  {static_cast<float>(1.0 - m.stretch_min), static_cast<float>(m.stretch_max - 1.0),
+                   static_cast<float>(m.shear)}};
   };
-  const double reference_Pa = stiffness_of(lattice_.label(lattice_.surface().front()));
-  for (const double young : young_Pa) stiffness_.push_back(static_cast<float>(young / reference_Pa));
+  const auto of_label = [&](std::uint8_t label) {
+    return tissue_of(lattice_.materials()[lattice_.material_of(label)]);
+  };
+  const Tissue reference = of_label(lattice_.label(lattice_.surface().front()));
+  std::vector<Tissue> tissues{{0.0, reference.second}};
+  for (const LinkMaterial& m : lattice_.materials().subspan(1)) tissues.push_back(tissue_of(m));
+  std::sort(tissues.begin() + 1, tissues.end());
+  tissues.erase(std::unique(tissues.begin(), tissues.end()), tissues.end());
+  for (const auto& [young_Pa, limits] : tissues) {
+    stiffness_.push_back(static_cast<float>(young_Pa / reference.first));
+    limits_.push_back(limits);
+  }
   for (std::size_t label = 1; label < rank_.size(); ++label) {
     const auto l = static_cast<std::uint8_t>(label);
     if (lattice_.material_of(l) == 0) continue;
-    const auto found = std::lower_bound(young_Pa.begin(), young_Pa.end(), stiffness_of(l));
-    rank_[label] = static_cast<std::uint8_t>(found - young_Pa.begin());
+    const auto found = std::lower_bound(tissues.begin() + 1, tissues.end(), of_label(l));
+    rank_[label] = static_cast<std::uint8_t>(found - tissues.begin());
   }
   const std::size_t ranks = stiffness_.size();
   series_pair_.assign(ranks * ranks, 0.0F);
@@ -281,6 +292,44 @@ void CoarseMaterial::find_stiffness() {
     coarsen_stiffness(levels_[m - 1], levels_[m]);
 }
 
+// Adds up the limits of the cells in each stored cube.
+void CoarseMaterial::add_limits() {
+  constexpr int kEdge = 1 << kFirstLevel;
+  const auto allocate = [](CubeLevel& level) {
+    for (auto& limits : level.limits)
+      limits.assign(index(level.dims[0]) * index(level.dims[1]) * index(level.dims[2]), 0.0F);
+  };
+  CubeLevel& fine = levels_[kFirstLevel];
+  allocate(fine);
+  const int nx = fine.dims[0] * kEdge, ny = fine.dims[1] * kEdge;
+  std::vector<std::uint8_t> cells(index(nx) * index(ny));
+  for (int k = 0; k < fine.dims[2] * kEdge; ++k) {
+    cell_ranks(k, 0, nx, 0, ny, cells.data());
+    for (int j = 0; j < ny; ++j) {
+      const std::size_t row = fine.at({0, j / kEdge, k / kEdge});
+      for (int i = 0; i < nx; ++i) {
+        const std::uint8_t rank = cells[index(j) * index(nx) + index(i)];
+        for (std::size_t q = 0; rank != 0 && q < 3; ++q)
+          fine.limits[q][row + index(i / kEdge)] += limits_[rank][q];
+      }
+    }
+  }
+  for (std::size_t m = kFirstLevel + 1; m < levels_.size(); ++m) {
+    const CubeLevel& below = levels_[m - 1];
+    CubeLevel& coarse = levels_[m];
+    allocate(coarse);
+    Index3 b{};
+    for (b[2] = 0; b[2] < below.dims[2]; ++b[2]) {
+      for (b[1] = 0; b[1] < below.dims[1]; ++b[1]) {
+        for (b[0] = 0; b[0] < below.dims[0]; ++b[0]) {
+          for (std::size_t q = 0; q < 3; ++q)
+            coarse.limits[q][coarse.at({b[0] / 2, b[1] / 2, b[2] / 2})] += below.limits[q][below.at(b)];
+        }
+      }
+    }
+  }
+}
+
 // Cells in a cube of 2^m cells an edge.
 float CoarseMaterial::cell_count(const CubeLevel& level, int m, const Index3& cube) const noexcept {
   if (!level.in(cube)) return 0.0F;
@@ -436,12 +485,49 @@ void CoarseMaterial::cube_stiffness(int m, int z, int first_x, int nx, int first
   }
 }
 
+void CoarseMaterial::voxel_limits(const Index3& p, int nx, const std::array<float*, 3>& out) noexcept {
+  voxel_scratch_.resize(index(nx));
+  voxel_ranks(p[0] - offset_[0], nx, p[1] - offset_[1], p[2] - offset_[2], voxel_scratch_.data());
+  for (int i = 0; i < nx; ++i) {
+    for (std::size_t q = 0; q < 3; ++q) out[q][i] = limits_[voxel_scratch_[index(i)]][q];
+  }
+}
+
+void CoarseMaterial::cube_limits(int m, int z, int first_x, int nx, int first_y, int ny,
+                                 const std::array<float*, 3>& out) noexcept {
+  if (m >= kFirstLevel) {
+    const CubeLevel& level = levels_[index(std::min(m, kLevels - 1))];
+    for (int j = 0; j < ny; ++j) {
+      for (int i = 0; i < nx; ++i) {
+        const Index3 b{first_x + i, first_y + j, z};
+        const bool in = level.in(b);
+        for (std::size_t q = 0; q < 3; ++q) out[q][j * nx + i] = in ? level.limits[q][level.at(b)] : 0.0F;
+      }
+    }
+    return;
+  }
+  const int edge = 1 << m, wide = nx * edge, high_y = ny * edge;
+  cell_scratch_.resize(index(wide) * index(high_y));
+  for (float* const limits : out) std::fill_n(limits, nx * ny, 0.0F);
+  for (int k = z * edge; k < (z + 1) * edge; ++k) {
+    cell_ranks(k, first_x * edge, wide, first_y * edge, high_y, cell_scratch_.data());
+    for (int j = 0; j < high_y; ++j) {
+      for (int i = 0; i < wide; ++i) {
+        const std::uint8_t rank = cell_scratch_[index(j) * index(wide) + index(i)];
+        for (std::size_t q = 0; rank != 0 && q < 3; ++q) out[q][(j >> m) * nx + (i >> m)] += limits_[rank][q];
+      }
+    }
+  }
+}
+
 std::size_t CoarseMaterial::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + anchor_faces_.capacity() * sizeof(PackedFace) +
                       faces_until_.capacity() * sizeof(std::uint32_t);
   for (const CubeLevel& k : levels_) {
     bytes += k.counts8.capacity() + k.counts.capacity() * sizeof(std::uint32_t) + k.anchored.capacity();
-    for (const auto& axis : k.stiffness) bytes += axis.capacity() * sizeof(float);
+    for (const auto* arrays : {&k.stiffness, &k.limits}) {
+      for (const auto& array : *arrays) bytes += array.capacity() * sizeof(float);
+    }
   }
   return bytes;
 }

@@ -56,8 +56,9 @@ class CoarseMaterial {
   [[nodiscard]] float thin_link(const Index3& p, std::size_t d, bool all_alike) const noexcept;
   // Has the object such links?
   [[nodiscard]] bool has_thin_links() const { return has_thin_links_; }
-  // Are there tissues of different stiffness?
+  // Are there tissues of different stiffness or limits?
   [[nodiscard]] bool is_heterogeneous() const { return stiffness_.size() > 2; }
+  [[nodiscard]] bool has_own_limits() const { return !lattice_.uniform_limits(); }
   [[nodiscard]] bool is_filled(const Index3& p) const noexcept;
   [[nodiscard]] bool is_anchored(const Index3& p) const noexcept;
 
@@ -73,6 +74,14 @@ class CoarseMaterial {
                       const std::array<float*, 3>& out) noexcept;
   // Stiffness of single cells, relative to the reference; 0 where there is no cell. out: [y][x], nx to a row.
   void cell_stiffness(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
+  // Limits of links within a tissue, as shares of the spacing along the link: shorter, longer, sheared.
+  using TissueLimits = std::array<float, 3>;
+  // Where limits differ: those of `nx` voxels along x from p on. Places without a voxel get those of the
+  // first surface voxel. out: [shorter, longer, sheared].
+  void voxel_limits(const Index3& p, int nx, const std::array<float*, 3>& out) noexcept;
+  // Where limits differ: cells of each cube times their limits. out: as in cube_stiffness().
+  void cube_limits(int m, int z, int first_x, int nx, int first_y, int ny,
+                   const std::array<float*, 3>& out) noexcept;
 
   // ---- anchors (coarse_anchors.cpp) ----
 
@@ -103,9 +112,6 @@ class CoarseMaterial {
   // cube.
   template <class Visit>
   void for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const;
-  // [surface number] links from a surface voxel to the nearest anchor; without a chain to one, the largest
-  // number. Allocates.
-  [[nodiscard]] std::vector<std::uint32_t> links_to_anchors() const;
   // Are the `count` voxels from p on in direction d all filled?
   [[nodiscard]] bool is_unbroken(Index3 p, std::size_t d, int count) const noexcept;
 
@@ -120,6 +126,7 @@ class CoarseMaterial {
     std::vector<std::uint32_t> counts;   // of coarser levels
     std::vector<std::uint8_t> anchored;  // 1: a voxel of the cube is anchored; cubes without the offset
     std::array<std::vector<float>, 3> stiffness;  // [d] cells times stiffness along d; where tissues differ
+    std::array<std::vector<float>, 3> limits;     // [shorter, …] cells times limit; where limits differ
     [[nodiscard]] bool in(const Index3& b) const {
       for (std::size_t d = 0; d < 3; ++d) {
         if (b[d] < 0 || b[d] >= dims[d]) return false;
@@ -139,6 +146,7 @@ class CoarseMaterial {
   void count_cells();
   void find_stiffness();
   void coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse) const;
+  void add_limits();
   void mark_anchors();
   [[nodiscard]] float relative_stiffness(const Index3& p) const noexcept;
   [[nodiscard]] bool find_thin_link() const noexcept;
@@ -154,8 +162,9 @@ class CoarseMaterial {
   Index3 dims_, offset_{};
   std::array<std::array<double, 2>, 3> anchored_share_{};
   bool fills_box_ = false, has_thin_links_ = false;
-  std::array<std::uint8_t, 256> rank_{};  // [label] rank of its stiffness, the softest 1; 0: no voxel
+  std::array<std::uint8_t, 256> rank_{};  // [label] rank of its tissue, the softest 1; 0: no voxel
   std::vector<float> stiffness_;          // [rank] relative to the reference's
+  std::vector<TissueLimits> limits_;      // [rank]; of rank 0: the reference's
   // [rank · ranks + rank] Mean stiffness of two cells in series, times their number. Rank 0 is no cell.
   std::vector<float> series_pair_;
   std::vector<CubeLevel> levels_;  // [m]

@@ -10,23 +10,43 @@ namespace {
 // Range of the factor by which one cycle may change the weight of a link at its limit.
 constexpr float kMaxCycleFactor = 2.0F, kMinCycleFactor = 0.25F;
 
+LimitOfLinks from_node(LimitOfLinks limit, std::size_t n) {
+  if (limit.at_node != nullptr) limit.at_node += n;
+  return limit;
+}
+
+// Limits of the links from 8 nodes, n and after, to the nodes `by` floats further on.
+HYBRID_INLINE void limit_of(Float8& out, const LimitOfLinks& limit, std::ptrdiff_t n, std::size_t by) {
+  if (limit.at_node == nullptr) {
+    out = Float8{} + limit.all_m;
+    return;
+  }
+  Float8 own, next;
+  load(own, limit.at_node + n);
+  load(next, limit.at_node + n + by);
+  out = limit.half_length_m * (own + next);
+}
+
 // The fall over each link; without a link, more than any bound.
-HYBRID_INLINE void fall_over(Float8& fall, const float* weight, float by) {
-  Float8 w;
-  load(w, weight);
+HYBRID_INLINE void fall_over(Float8& fall, const float* weight, const LimitOfLinks& limit, std::ptrdiff_t n,
+                             std::size_t by) {
+  Float8 w, over;
+  load(w, weight + n);
+  limit_of(over, limit, n, by);
   const Float8 none = Float8{} - kNoBound;
-  fall = w > Float8{} ? Float8{} + by : none;
+  fall = w > Float8{} ? over : none;
 }
 
 // Raises the bounds of a row from its low end to its high end: bound(i) becomes max(bound(i), bound(i − 1) −
 // fall(i)). Within a vector of 8 bounds this is a scan with three shifts (Hillis & Steele 1986).
-HYBRID_INLINE void sweep_row_up(float* bound, const float* weight, float by, int first, int last) {
+HYBRID_INLINE void sweep_row_up(float* bound, const float* weight, const LimitOfLinks& limit, int first,
+                                int last) {
   const Float8 no_bound = Float8{} + kNoBound, zero{};
   Float8 carried = no_bound;
   for (int o = first; o <= last; ++o) {
     Float8 y, fall, from;
     load(y, bound + o * kLanes);
-    fall_over(fall, weight + o * kLanes - 1, by);
+    fall_over(fall, weight, limit, o * kLanes - 1, 1);
     from = __builtin_shufflevector(no_bound, y, 0, 8, 9, 10, 11, 12, 13, 14);
     take_largest(y, from - fall);
     Float8 before = __builtin_shufflevector(zero, fall, 0, 8, 9, 10, 11, 12, 13, 14);
@@ -45,13 +65,14 @@ HYBRID_INLINE void sweep_row_up(float* bound, const float* weight, float by, int
   }
 }
 
-HYBRID_INLINE void sweep_row_down(float* bound, const float* weight, float by, int first, int last) {
+HYBRID_INLINE void sweep_row_down(float* bound, const float* weight, const LimitOfLinks& limit, int first,
+                                  int last) {
   const Float8 no_bound = Float8{} + kNoBound, zero{};
   Float8 carried = no_bound;
   for (int o = last; o >= first; --o) {
     Float8 y, fall, from;
     load(y, bound + o * kLanes);
-    fall_over(fall, weight + o * kLanes, by);
+    fall_over(fall, weight, limit, o * kLanes, 1);
     from = __builtin_shufflevector(y, no_bound, 1, 2, 3, 4, 5, 6, 7, 8);
     take_largest(y, from - fall);
     Float8 after = __builtin_shufflevector(fall, zero, 1, 2, 3, 4, 5, 6, 7, 8);
@@ -70,17 +91,30 @@ HYBRID_INLINE void sweep_row_down(float* bound, const float* weight, float by, i
   }
 }
 
-// Raises the bounds of a row by those of a row beside it.
-HYBRID_INLINE void take_from_row(float* bound, const float* beside, const float* weight, float by, int first,
-                                 int last) {
-  for (int o = first; o <= last; ++o) {
+// Raises the bounds of one of two rows beside each other by those of the other. `n`: first node of the lower
+// row; the other row is `by` floats further on along d. `up`: raises those of the upper row.
+HYBRID_INLINE void raise_row(const BoundSweep& s, std::size_t d, std::size_t n, std::size_t by, bool up) {
+  const float* const weight = s.weight[d] + n;
+  const LimitOfLinks limit = from_node(up ? s.fall_up[d] : s.fall_down[d], n);
+  float* const bound = s.bound + (up ? n + by : n);
+  const float* const beside = s.bound + (up ? n : n + by);
+  for (int o = s.low[0] / kLanes; o <= s.high[0] / kLanes; ++o) {
     Float8 y, from, fall;
     load(y, bound + o * kLanes);
     load(from, beside + o * kLanes);
-    fall_over(fall, weight + o * kLanes, by);
+    fall_over(fall, weight, limit, o * kLanes, by);
     take_largest(y, from - fall);
     store(bound + o * kLanes, y);
   }
+}
+
+HYBRID_INLINE void inverse_limits(Float8& per_longer, Float8& per_shorter, const LinkMultiplier& limit,
+                                  std::ptrdiff_t n, std::size_t by) {
+  const Float8 one = Float8{} + 1.0F;
+  limit_of(per_longer, limit.longer, n, by);
+  limit_of(per_shorter, limit.shorter, n, by);
+  per_longer = one / per_longer;
+  per_shorter = one / per_shorter;
 }
 
 }  // namespace
@@ -93,31 +127,19 @@ HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
   for (int k = s.low[2]; k <= s.high[2]; ++k) {
     for (int j = s.low[1]; j <= s.high[1]; ++j) {
       const std::size_t n = row(j, k);
-      sweep_row_up(s.bound + n, s.weight[0] + n, s.fall_up[0], first, last);
-      sweep_row_down(s.bound + n, s.weight[0] + n, s.fall_down[0], first, last);
+      sweep_row_up(s.bound + n, s.weight[0] + n, from_node(s.fall_up[0], n), first, last);
+      sweep_row_down(s.bound + n, s.weight[0] + n, from_node(s.fall_down[0], n), first, last);
     }
   }
   for (int k = s.low[2]; k <= s.high[2]; ++k) {
-    for (int j = s.low[1] + 1; j <= s.high[1]; ++j) {
-      const std::size_t from = row(j - 1, k), to = row(j, k);
-      take_from_row(s.bound + to, s.bound + from, s.weight[1] + from, s.fall_up[1], first, last);
-    }
-    for (int j = s.high[1] - 1; j >= s.low[1]; --j) {
-      const std::size_t from = row(j + 1, k), to = row(j, k);
-      take_from_row(s.bound + to, s.bound + from, s.weight[1] + to, s.fall_down[1], first, last);
-    }
+    for (int j = s.low[1]; j < s.high[1]; ++j) raise_row(s, 1, row(j, k), s.stride, true);
+    for (int j = s.high[1] - 1; j >= s.low[1]; --j) raise_row(s, 1, row(j, k), s.stride, false);
   }
-  for (int k = s.low[2] + 1; k <= s.high[2]; ++k) {
-    for (int j = s.low[1]; j <= s.high[1]; ++j) {
-      const std::size_t from = row(j, k - 1), to = row(j, k);
-      take_from_row(s.bound + to, s.bound + from, s.weight[2] + from, s.fall_up[2], first, last);
-    }
+  for (int k = s.low[2]; k < s.high[2]; ++k) {
+    for (int j = s.low[1]; j <= s.high[1]; ++j) raise_row(s, 2, row(j, k), s.plane, true);
   }
   for (int k = s.high[2] - 1; k >= s.low[2]; --k) {
-    for (int j = s.low[1]; j <= s.high[1]; ++j) {
-      const std::size_t from = row(j, k + 1), to = row(j, k);
-      take_from_row(s.bound + to, s.bound + from, s.weight[2] + to, s.fall_down[2], first, last);
-    }
+    for (int j = s.low[1]; j <= s.high[1]; ++j) raise_row(s, 2, row(j, k), s.plane, false);
   }
 }
 
@@ -185,8 +207,9 @@ HYBRID_MULTIVERSIONED float largest_limit_ratio(const float* u, const float* wei
     load(own, u + n);
     load(next, u + n + by);
     load(g, weight + n);
-    const Float8 longer = next - own, of_high = limit.per_longer * longer,
-                 of_low = -limit.per_shorter * longer;
+    Float8 per_longer, per_shorter;
+    inverse_limits(per_longer, per_shorter, limit, static_cast<std::ptrdiff_t>(n), by);
+    const Float8 longer = next - own, of_high = per_longer * longer, of_low = -per_shorter * longer;
     Float8 of = of_high > of_low ? of_high : of_low;
     of = g > zero ? of : zero;
     take_largest(most, of);
@@ -208,8 +231,9 @@ HYBRID_MULTIVERSIONED float update_row_weights(const float* u, const float* weig
     load(next, u + n + by);
     load(g, weight + n);
     load(h, limited + n);
-    const Float8 longer = next - own, of_high = limit.per_longer * longer,
-                 of_low = -limit.per_shorter * longer;
+    Float8 per_longer, per_shorter;
+    inverse_limits(per_longer, per_shorter, limit, static_cast<std::ptrdiff_t>(n), by);
+    const Float8 longer = next - own, of_high = per_longer * longer, of_low = -per_shorter * longer;
     const Float8 of = of_high > of_low ? of_high : of_low;
     Float8 factor = of * (0.5F + 0.5F * of);
     factor = factor < kMaxCycleFactor ? factor : zero + kMaxCycleFactor;

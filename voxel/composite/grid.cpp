@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace voxel {
 namespace {
@@ -34,15 +35,25 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
       half_width_(half_width == kRefineAll ? kRefineAll : std::max((half_width + 1) / 2 * 2, kHalfWidth)),
       coarse_half_width_(std::max((coarse_half_width + 1) / 2 * 2, kHalfWidth)) {
   const auto& dims = lattice.grid().dims;
-  const std::uint8_t label = lattice.label(lattice.surface().front());
+  const std::uint8_t reference = lattice.label(lattice.surface().front());
   for (int d = 0; d < 3; ++d) {
-    const auto dd = index(d);
-    const Spring& spring = lattice.spring_within(label, d);
-    const LinkLimit& limit = lattice.limit_between(label, label, d);
+    const Spring& spring = lattice.spring_within(reference, d);
     for (int axis = 0; axis < 3; ++axis) {
-      spring_N_per_m_[dd][index(axis)] = spring.on(axis, d);
-      limit_m_[dd][index(axis)] = axis == d ? std::array<float, 2>{-limit.along_low, limit.along_high}
-                                            : std::array<float, 2>{limit.across, limit.across};
+      spring_N_per_m_[index(d)][index(axis)] = spring.on(axis, d);
+      auto& limits = limit_m_[index(d)][index(axis)];
+      limits.fill({std::numeric_limits<float>::max(), 0.0F});
+      for (std::size_t label = 1; label < 256; ++label) {
+        const auto of = static_cast<std::uint8_t>(label);
+        if (lattice.material_of(of) == 0) continue;
+        const LinkLimit& limit = lattice.limit_between(of, of, d);
+        const std::array<float, 2> sides = axis == d
+                                               ? std::array<float, 2>{-limit.along_low, limit.along_high}
+                                               : std::array<float, 2>{limit.across, limit.across};
+        for (std::size_t side = 0; side < 2; ++side) {
+          limits[side].tightest = std::min(limits[side].tightest, sides[side]);
+          limits[side].widest = std::max(limits[side].widest, sides[side]);
+        }
+      }
     }
   }
   pressed_.reserve(kMaxPressed);
@@ -141,7 +152,7 @@ glm::dvec3 CompositeGrid::compliance(const Index3& voxel) const noexcept {
 }
 
 glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept {
-  if (material_.has_scattered_anchors()) return clamp_to_nearest_anchor(voxel, u);
+  if (!chains_.empty()) return clamp_to_chains(voxel, u);
   glm::dvec3 result = u;
   const auto& dims = lattice_.grid().dims;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -150,8 +161,8 @@ glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3
       const int links = end == 1 ? dims[d] - 1 - voxel[d] : voxel[d];
       for (std::size_t a = 0; a < 3; ++a) {
         // Above the low face u is the extension of the chain of links; below the high face −u is.
-        const double shorter = links * static_cast<double>(limit_m_[d][a][0]),
-                     longer = links * static_cast<double>(limit_m_[d][a][1]);
+        const double shorter = links * static_cast<double>(limit_m_[d][a][0].widest),
+                     longer = links * static_cast<double>(limit_m_[d][a][1].widest);
         double& at = result[static_cast<int>(a)];
         at = std::clamp(at, end == 1 ? -longer : -shorter, end == 1 ? shorter : longer);
       }
@@ -176,21 +187,16 @@ void CompositeGrid::reserve_like(const CompositeGrid& original) {
 }
 
 void CompositeGrid::find_chains_to_anchors() {
-  if (material_.has_scattered_anchors()) links_to_anchor_ = material_.links_to_anchors();
+  if (material_.has_scattered_anchors() || material_.has_own_limits()) chains_ = chains_to_anchors(lattice_);
 }
 
-// On each axis the displacement is at most the extension of a chain to the nearest anchor with each link at
-// the widest limit.
-glm::dvec3 CompositeGrid::clamp_to_nearest_anchor(const Index3& voxel, const glm::dvec3& u) const noexcept {
+glm::dvec3 CompositeGrid::clamp_to_chains(const Index3& voxel, const glm::dvec3& u) const noexcept {
   const std::uint32_t s = lattice_.surface_number(lattice_.at(voxel[0], voxel[1], voxel[2]));
-  if (s >= links_to_anchor_.size()) return u;
+  if (s >= chains_.size()) return u;
   glm::dvec3 result = u;
   for (std::size_t a = 0; a < 3; ++a) {
-    float widest = 0.0F;
-    for (const auto& d : limit_m_) widest = std::max({widest, d[a][0], d[a][1]});
-    const double most = links_to_anchor_[s] * static_cast<double>(widest);
     double& at = result[static_cast<int>(a)];
-    at = std::clamp(at, -most, most);
+    at = std::clamp(at, -static_cast<double>(chains_[s][a][0]), static_cast<double>(chains_[s][a][1]));
   }
   return result;
 }

@@ -15,7 +15,7 @@
 // springs. Where a whole side is anchored, the distance to the anchor gives the spring. Elsewhere the spring
 // includes the constriction of the load that spreads from the anchors (scattered_anchors.cpp). A coarse level
 // may resist a correction less than the finer level does. Its corrections would then be too large, so there
-// springs shorten them (correction_springs.cpp). Tissues may differ in stiffness, but not in limits or
+// springs shorten them (correction_springs.cpp). Tissues may differ in stiffness and in limits, but not in
 // Poisson's ratio.
 //
 // Limits. In a convex body of one tissue the equilibrium within the chain limits solves an obstacle problem:
@@ -25,7 +25,8 @@
 // node has bounds of its own. With limits of links, projected multigrid stalls where the chain is at its
 // limits; with bounds of nodes it does not. Near a notch or the edge of an anchored region the bounds are
 // still necessary but not sufficient: links may exceed their limits there (worst_violation()). Where tissues
-// differ, links also have multipliers of their own (link_limits.cpp).
+// differ, links also have multipliers of their own (link_limits.cpp). A link has the mean of the limits of
+// the tissue round its two nodes; on level 0 it is the lattice's.
 //
 // Rigid surfaces that stand still bound the nodes beside them (rigid_contacts.cpp).
 #pragma once
@@ -40,6 +41,7 @@
 #include <string>
 #include <vector>
 
+#include "voxel/composite/anchor_chains.h"
 #include "voxel/composite/coarse_material.h"
 #include "voxel/composite/level.h"
 #include "voxel/lattice/displacement.h"
@@ -47,6 +49,7 @@
 
 namespace voxel {
 namespace composite {
+struct LimitOfLinks;
 struct LinkMultiplier;
 struct ProlongArgs;
 struct LevelView;
@@ -67,8 +70,8 @@ class CompositeGrid {
   // (nodes). Both are rounded up to even numbers >= kHalfWidth. kRefineAll: level 0 covers the whole object,
   // for references. Allocates.
   CompositeGrid(const Lattice& lattice, int half_width, int coarse_half_width = kHalfWidth);
-  // Call it before contacts. If anchors are scattered, it counts the links from each surface voxel to the
-  // nearest anchor, for clamp_to_supports(). Allocates.
+  // Call it before contacts. If anchors are scattered or limits differ, it finds the extension of the chains
+  // from each surface voxel to the anchors, for clamp_to_supports(). Allocates.
   void find_chains_to_anchors();
   // Call it after a copy. A copied list has only as much capacity as it has elements, and some lists are cut
   // short at their capacity. So a copy without it would work on other patches. Allocates.
@@ -283,6 +286,8 @@ class CompositeGrid {
   void weigh_thin_links(const Level& level, std::array<Floats, 3>& weight, bool all_alike) const noexcept;
   void weigh_halves(const Level& level, std::array<Floats, 3>& weight) noexcept;
   void weigh_tissues(Level& level) noexcept;
+  void find_node_limits(Level& level) noexcept;
+  void find_coarse_limits(Level& level) noexcept;
   [[nodiscard]] static int half_cube(const Level& level) noexcept;
   // ---- node_bounds.cpp ----
   void find_bounds(std::size_t axis) noexcept;
@@ -333,12 +338,17 @@ class CompositeGrid {
                          float* to) const noexcept;
   // ---- link_limits.cpp ----
   void update_multipliers(std::size_t axis) noexcept;
+  void drop_multipliers_at_sides(Level& level, std::size_t axis) noexcept;
   float update_anchor_multipliers(Level& level, std::size_t axis, std::size_t d) noexcept;
   void restrict_multipliers(std::size_t l, std::size_t axis) noexcept;
   void update_diagonal(Level& level, std::size_t axis) const noexcept;
   void release_multipliers() noexcept;
   void save_multipliers(const Level& level) noexcept;
   void restore_multipliers(Level& level, const Index3& by) noexcept;
+  // Limit of the links along d for differences of the displacements on `axis`; side 0: shorter, 1: longer.
+  // Its at_node is of the level's first row.
+  [[nodiscard]] composite::LimitOfLinks limit_of_links(const Level& level, std::size_t axis, std::size_t d,
+                                                       std::size_t side) const noexcept;
   [[nodiscard]] composite::LinkMultiplier link_multiplier(const Level& level, std::size_t axis,
                                                           std::size_t d) const noexcept;
   [[nodiscard]] const std::array<Floats, 3>& weights_on(const Level& level, std::size_t axis) const {
@@ -355,7 +365,7 @@ class CompositeGrid {
             voxel[2] + material_.offset()[2]};
   }
   [[nodiscard]] std::size_t fine_node(const Index3& voxel) const;  // grid.cpp
-  [[nodiscard]] glm::dvec3 clamp_to_nearest_anchor(const Index3& voxel, const glm::dvec3& u) const noexcept;
+  [[nodiscard]] glm::dvec3 clamp_to_chains(const Index3& voxel, const glm::dvec3& u) const noexcept;
   [[nodiscard]] glm::dvec3 clamp_to_anchors(const Index3& voxel, const glm::dvec3& u) const noexcept;
   // A node's displacement of least energy without bounds, with its neighbours fixed (m).
   [[nodiscard]] glm::dvec3 minimum_at(const Level& level, std::size_t node) const noexcept;  // grid.cpp
@@ -366,9 +376,13 @@ class CompositeGrid {
 
   const Lattice& lattice_;
   CoarseMaterial material_;
-  std::array<std::array<float, 3>, 3> spring_N_per_m_{};          // [d][axis] of a link between two voxels
-  std::array<std::array<std::array<float, 2>, 3>, 3> limit_m_{};  // [d][axis][0: shorter, 1: longer], >= 0
-  std::vector<std::uint32_t> links_to_anchor_;  // [surface number]; empty unless anchors are scattered
+  std::array<std::array<float, 3>, 3> spring_N_per_m_{};  // [d][axis] of a link between two voxels
+  // Limits of links between two voxels (m), >= 0, in the tissue of the tightest and of the widest limit.
+  struct LimitRange {
+    float tightest, widest;
+  };
+  std::array<std::array<std::array<LimitRange, 2>, 3>, 3> limit_m_{};  // [d][axis][0: shorter, 1: longer]
+  std::vector<ChainExtension> chains_;  // [surface number]; empty: all anchors are whole sides, limits alike
   int half_width_, coarse_half_width_;
   Index3 centre_{};
   std::vector<Level> levels_;

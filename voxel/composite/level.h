@@ -78,6 +78,9 @@ struct GridLevel {
   // the weights with the multipliers of links at their limits (link_limits.cpp).
   std::array<Floats, 3> shape_weight, anchor_distance;
   std::array<std::array<Floats, 3>, 3> limited_weight, limited_anchor_weight;
+  // Only where limits differ. Mean of the limits of the tissue round each node
+  // (CoarseMaterial::TissueLimits).
+  std::array<Floats, 3> limit;
   std::array<Floats, 3> inverse_diagonal, diagonal;  // [axis] of the stiffness matrix; inverse 0: fixed
   // Of the axis that the cycle is solving (LevelView). restricted_u: u before the level was smoothed.
   Floats f, restricted_u, residual, is_free, is_active, active_stiffness, inverse_with_active;

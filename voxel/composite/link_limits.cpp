@@ -25,10 +25,19 @@ constexpr float kTolerance = 2e-3F;
 
 }  // namespace
 
+composite::LimitOfLinks CompositeGrid::limit_of_links(const Level& level, std::size_t a, std::size_t d,
+                                                      std::size_t side) const noexcept {
+  const auto step = static_cast<float>(level.step);
+  composite::LimitOfLinks limit{step * limit_m_[d][a][side].widest, nullptr, 0.0F};
+  if (!material_.has_own_limits()) return limit;
+  limit.at_node = level.limit[d == a ? side : 2].data() + level.first_row();
+  limit.half_length_m = 0.5F * step * static_cast<float>(lattice_.spacing_m()[static_cast<int>(d)]);
+  return limit;
+}
+
 composite::LinkMultiplier CompositeGrid::link_multiplier(const Level& level, std::size_t a,
                                                          std::size_t d) const noexcept {
-  const auto step = static_cast<float>(level.step);
-  return {1.0F / (step * limit_m_[d][a][1]), 1.0F / (step * limit_m_[d][a][0]), kTolerance, kMaxFactor};
+  return {limit_of_links(level, a, d, 1), limit_of_links(level, a, d, 0), kTolerance, kMaxFactor};
 }
 
 // Call it after a cycle on axis `a`.
@@ -67,6 +76,7 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
                              limit, level.limited_weight[a][d].data() + from, level.floats()));
       most = std::max(most, update_anchor_multipliers(level, a, d));
     }
+    drop_multipliers_at_sides(level, a);
   }
   if (most > 1.0F) {
     for (std::size_t l = 1; l < levels_.size(); ++l) restrict_multipliers(l, a);
@@ -76,12 +86,39 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
   for (Level& level : levels_) update_diagonal(level, a);
 }
 
+// Nodes in the sides of a patch within the object hold displacements interpolated from the next level. These
+// may exceed the limits of single links. So links of such nodes have no multipliers; the next level's links
+// have.
+void CompositeGrid::drop_multipliers_at_sides(Level& level, std::size_t a) noexcept {
+  const auto& nodes = level.nodes;
+  for (std::size_t e = 0; e < 3; ++e) {
+    for (const bool high : {false, true}) {
+      if (!(high ? nodes[e].open_high : nodes[e].open_low)) continue;
+      const std::size_t p = (e + 1) % 3, q = (e + 2) % 3;
+      Index3 node{};
+      node[e] = high ? nodes[e].count - 1 : 0;
+      const auto drop = [&](std::size_t d, std::size_t n) {
+        level.limited_weight[a][d][n] = level.weight[d][n];
+      };
+      for (node[q] = 0; node[q] < nodes[q].count; ++node[q]) {
+        for (node[p] = 0; node[p] < nodes[p].count; ++node[p]) {
+          const std::size_t n = level.node(node[0], node[1], node[2]);
+          drop(p, n);
+          drop(q, n);
+          drop(e, high ? n - level.stride_along(e) : n);
+        }
+      }
+    }
+  }
+}
+
 // Updates the multipliers of the links to anchors, as update_row_weights() does for links between nodes.
 // Returns the largest limited / weight, >= 1.
 float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std::size_t d) noexcept {
   float most = 1.0F;
   if (!level.has_anchors) return most;
   const std::size_t from = level.first_row(), end = from + level.floats();
+  const composite::LinkMultiplier links = link_multiplier(level, a, d);
   const float *const weight = level.anchor_weight[d].data(), *const distance =
                                                                  level.anchor_distance[d].data();
   const float* const u = level.u[a].data();
@@ -90,8 +127,11 @@ float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std:
     if (weight[n] == 0.0F) continue;
     // The link's extension is −u if the anchor is ahead, u if it is behind.
     const float longer = -u[n] / distance[n];
-    const float limit_ratio = std::max(longer / limit_m_[d][a][1], -longer / limit_m_[d][a][0]);
-    limited[n] = composite::updated_weight(limited[n], weight[n], limit_ratio, link_multiplier(level, a, d));
+    // `links` are as long as the level's step, the chain to the anchor `distance` voxels.
+    const float limit_ratio =
+        static_cast<float>(level.step) * std::max(longer / composite::limit_at(links.longer, n - from, 0),
+                                                  -longer / composite::limit_at(links.shorter, n - from, 0));
+    limited[n] = composite::updated_weight(limited[n], weight[n], limit_ratio, links);
     most = std::max(most, limited[n] / weight[n]);
   }
   return most;

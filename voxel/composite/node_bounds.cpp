@@ -29,7 +29,7 @@ CompositeGrid::NodeBox CompositeGrid::reach_of_bounds(const Level& level, std::s
     const auto& nodes = level.nodes[d];
     const int all = level.step * nodes.count;
     const auto voxels = [&](std::size_t side) {
-      const float fall = limit_m_[d][a][side ^ kind];
+      const float fall = limit_m_[d][a][side ^ kind].tightest;
       return fall > 0.0F ? static_cast<int>(std::min(fall_m / fall, static_cast<float>(all))) + 1 : all;
     };
     const int low = pressed.low[d] - voxels(1) - nodes.begin,
@@ -46,13 +46,12 @@ CompositeGrid::NodeBox CompositeGrid::reach_of_bounds(const Level& level, std::s
 void CompositeGrid::propagate_bounds(Level& level, std::size_t a, std::size_t kind,
                                      const NodeBox& box) const noexcept {
   const std::size_t from = level.first_row();
-  const auto step = static_cast<float>(level.step);
   composite::BoundSweep sweep{};
   sweep.bound = level.bound[kind].data() + from;
   for (std::size_t d = 0; d < 3; ++d) {
     sweep.weight[d] = level.weight[d].data() + from;
-    sweep.fall_up[d] = limit_m_[d][a][kind] * step;
-    sweep.fall_down[d] = limit_m_[d][a][1 - kind] * step;
+    sweep.fall_up[d] = limit_of_links(level, a, d, kind);
+    sweep.fall_down[d] = limit_of_links(level, a, d, 1 - kind);
   }
   sweep.low = box.low;
   sweep.high = box.high;

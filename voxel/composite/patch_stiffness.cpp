@@ -202,6 +202,63 @@ void CompositeGrid::weigh_tissues(Level& level) noexcept {
   }
 }
 
+// Finds the mean limits of the tissue round each node.
+void CompositeGrid::find_node_limits(Level& level) noexcept {
+  if (level.step > 1) return find_coarse_limits(level);
+  const auto& nodes = level.nodes;
+  for (int k = 0; k < nodes[2].count; ++k) {
+    for (int j = 0; j < nodes[1].count; ++j) {
+      const std::size_t row = level.row(j, k);
+      material_.voxel_limits(
+          {level.at(0, 0), level.at(1, j), level.at(2, k)}, nodes[0].count,
+          {level.limit[0].data() + row, level.limit[1].data() + row, level.limit[2].data() + row});
+    }
+  }
+}
+
+// Eight half cells lie round a node of a coarse level.
+void CompositeGrid::find_coarse_limits(Level& level) noexcept {
+  const auto& nodes = level.nodes;
+  const int nx = nodes[0].count, ny = nodes[1].count, hx = 2 * nx, hy = 2 * ny;
+  const int m = half_cube(level), edge = 1 << m;
+  const int x = nodes[0].begin / edge - 1, y = nodes[1].begin / edge - 1;
+  HalfCells& plane = half_cells_[0];
+  Floats& around = half_cells_[1].cells;  // cells round each node of the plane
+  for (Floats* const array : {&plane.cells, &plane.stiffness[0], &plane.stiffness[1], &plane.stiffness[2]})
+    array->resize(std::max(array->size(), index(hx) * index(hy)));
+  around.resize(std::max(around.size(), index(nx) * index(ny)));
+  for (int k = 0; k < nodes[2].count; ++k) {
+    std::fill(around.begin(), around.end(), 0.0F);
+    for (int j = 0; j < ny; ++j) {
+      for (Floats& limit : level.limit) std::fill_n(limit.data() + level.row(j, k), nx, 0.0F);
+    }
+    for (const int half : {0, 1}) {
+      const int z = nodes[2].begin / edge + 2 * k + half - 1;
+      material_.cell_counts(m, z, x, hx, y, hy, plane.cells.data());
+      material_.cube_limits(
+          m, z, x, hx, y, hy,
+          {plane.stiffness[0].data(), plane.stiffness[1].data(), plane.stiffness[2].data()});
+      for (int j = 0; j < ny; ++j) {
+        for (int i = 0; i < nx; ++i) {
+          const std::size_t h = index(2 * j * hx + 2 * i), g = h + index(hx);
+          const auto of = [&](const Floats& p) { return p[h] + p[h + 1] + p[g] + p[g + 1]; };
+          around[index(j * nx + i)] += of(plane.cells);
+          for (std::size_t q = 0; q < 3; ++q) level.limit[q][level.node(i, j, k)] += of(plane.stiffness[q]);
+        }
+      }
+    }
+    for (int j = 0; j < ny; ++j) {
+      for (int i = 0; i < nx; ++i) {
+        const float cells = around[index(j * nx + i)];
+        for (Floats& limit : level.limit) {
+          float& at = limit[level.node(i, j, k)];
+          at = cells > 0.0F ? at / cells : 1.0F;  // without tissue there are no links to limit
+        }
+      }
+    }
+  }
+}
+
 // In an object that fills its box a link's weight is the product of a length and two widths.
 void CompositeGrid::weigh_box(const Level& level, std::array<Floats, 3>& weight) noexcept {
   const auto& nodes = level.nodes;

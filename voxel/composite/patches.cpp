@@ -72,6 +72,9 @@ void CompositeGrid::allocate(Level& level, std::size_t l) const {
       for (Floats& array : *arrays) array.assign(floats, 0.0F);
     }
   }
+  if (material_.has_own_limits()) {
+    for (Floats& array : level.limit) array.assign(floats, 1.0F);
+  }
   // There are about as many ghosts as surface nodes.
   const std::size_t share = material_.fills_box() ? kFewerGhosts : 1;
   if (!material_.fills_box() || material_.has_scattered_anchors())
@@ -199,6 +202,7 @@ void CompositeGrid::set_up_transfer(Level& fine, Level& coarse) const noexcept {
 
 void CompositeGrid::assemble(Level& level) noexcept {
   weigh(level);
+  if (material_.has_own_limits()) find_node_limits(level);
   Index3 low{}, high{};
   for (std::size_t d = 0; d < 3; ++d) {
     low[d] = level.at(d, 0);

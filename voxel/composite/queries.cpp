@@ -92,11 +92,13 @@ double CompositeGrid::worst_violation() const noexcept {
         const std::size_t n = level.node(i, j, k);
         for (std::size_t d = 0; d < 3; ++d) {
           if (level.weight[d][n] == 0.0F) continue;
-          const std::size_t by = d == 0 ? 1 : d == 1 ? level.stride : level.plane;
+          const std::size_t by = level.stride_along(d);
           for (std::size_t a = 0; a < 3; ++a) {
             const float longer = level.u[a][n + by] - level.u[a][n];
-            most = std::max(
-                most, static_cast<double>(std::max(longer - limit_m_[d][a][1], -longer - limit_m_[d][a][0])));
+            const auto limit = [&](std::size_t side) {
+              return composite::limit_at(limit_of_links(level, a, d, side), n - level.first_row(), by);
+            };
+            most = std::max(most, static_cast<double>(std::max(longer - limit(1), -longer - limit(0))));
           }
         }
       }
@@ -226,7 +228,7 @@ std::size_t CompositeGrid::memory_bytes() const {
                       is_beside_rigid_.capacity() + obstacle_loads_.capacity() * sizeof(ObstacleLoad) +
                       obstacle_bounds_.capacity() * sizeof(ObstacleBound) +
                       supporting_bounds_.capacity() * sizeof(std::uint32_t) +
-                      links_to_anchor_.capacity() * sizeof(std::uint32_t) + is_tissue_node_.capacity() +
+                      chains_.capacity() * sizeof(ChainExtension) + is_tissue_node_.capacity() +
                       faces_of_cell_.capacity() * sizeof(float);
   for (const auto& sides : anchor_faces_) {
     for (const AnchorFaces& faces : sides) bytes += 5 * faces.count.capacity() * sizeof(float);

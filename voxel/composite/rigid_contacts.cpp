@@ -265,9 +265,9 @@ bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
   return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// By how much a bound falls (m) along the shortest chain of links from the box low … high to the place `at`
-// (coordinates). A node of a coarse level stands for all voxels up to `beyond` voxels (half a step) away
-// across the bound's axis, so that many links do not count.
+// By how much a bound falls (m) at most along the shortest chain of links from the box low … high to the
+// place `at` (coordinates). A node of a coarse level stands for all voxels up to `beyond` voxels (half a
+// step) away across the bound's axis, so that many links do not count.
 double CompositeGrid::fall_from(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
                                 const Index3& high, int beyond) const noexcept {
   double fall = 0.0;
@@ -276,7 +276,8 @@ double CompositeGrid::fall_from(const Index3& at, std::size_t axis, std::size_t 
     const int links = std::max({above, below, 0}) - (d == axis ? 0 : beyond);
     // For a link from a up to b: u(b) >= u(a) − limit[0] and u(a) >= u(b) − limit[1]. For −u the two limits
     // change places.
-    if (links > 0) fall += links * static_cast<double>(limit_m_[d][axis][(above > 0 ? 0U : 1U) ^ kind]);
+    if (links > 0)
+      fall += links * static_cast<double>(limit_m_[d][axis][(above > 0 ? 0U : 1U) ^ kind].widest);
   }
   return fall;
 }

@@ -57,12 +57,25 @@ void link_forces_of_level(const LevelView& view, const std::array<int, 3>& first
 
 // ---- constraint_kernels.cpp ----
 
-// Limits of the links along one direction. The limit ratio of a link is its change of length divided by its
-// limit. At the limit the ratio is 1.
+// A limit of the links along one direction.
+struct LimitOfLinks {
+  float all_m;           // of all links, unless `at_node` is set (m)
+  const float* at_node;  // limit of the tissue at each node, as a share of the spacing. A link has the mean
+                         // of its two ends. Null: all links are alike.
+  float half_length_m;   // half of the length of a link
+};
+// Limit of the link from node n to the node `by` floats further on (m). by = 0: of a link in the tissue round
+// n.
+[[nodiscard]] inline float limit_at(const LimitOfLinks& limit, std::size_t n, std::size_t by) {
+  if (limit.at_node == nullptr) return limit.all_m;
+  return limit.half_length_m * (limit.at_node[n] + limit.at_node[n + by]);
+}
+// Multipliers of the links along one direction. The limit ratio of a link is its change of length divided by
+// its limit. At the limit the ratio is 1.
 struct LinkMultiplier {
-  float per_longer, per_shorter;  // 1 / limit (1/m)
-  float tolerance;                // links with a ratio of 1 ± this are at the limit
-  float max_factor;               // upper bound of limited weight / weight
+  LimitOfLinks longer, shorter;
+  float tolerance;   // links with a ratio of 1 ± this are at the limit
+  float max_factor;  // upper bound of limited weight / weight
 };
 // Largest limit ratio of the links from nodes to the nodes `by` floats further on.
 [[nodiscard]] float largest_limit_ratio(const float* u, const float* weight, std::size_t by,
@@ -79,7 +92,7 @@ float update_row_weights(const float* u, const float* weight, std::size_t by, co
 struct BoundSweep {
   float* bound;
   std::array<const float*, 3> weight;  // [d] as in LevelView; 0: no link
-  std::array<float, 3> fall_up, fall_down;
+  std::array<LimitOfLinks, 3> fall_up, fall_down;
   std::array<int, 3> low, high;  // nodes of the box, both included
   std::size_t stride, plane;
 };

@@ -87,7 +87,6 @@ bool alike_in_poisson(std::span<const LinkMaterial> materials) {
 }  // namespace
 
 CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
-  if (!lattice.uniform_limits()) return {"its materials have limits of their own"};
   if (!alike_in_poisson(lattice.materials().subspan(1))) return {"its materials differ in Poisson's ratio"};
   if (lattice.has_plasticity()) return {"it keeps dents"};
   if (lattice.has_bricks()) return {"it is of the accurate energy"};
@@ -108,7 +107,7 @@ CompositeGrid::Suitability CompositeGrid::try_contacts() {
   // Differences between neighbours stay below every limit, so that limits play no part.
   float least = std::numeric_limits<float>::max();
   for (const auto& d : limit_m_) {
-    for (const auto& axis : d) least = std::min({least, axis[0], axis[1]});
+    for (const auto& axis : d) least = std::min({least, axis[0].tightest, axis[1].tightest});
   }
   const float most_m = 0.5F * least;
   const auto depth_m = static_cast<double>(most_m);

@@ -56,8 +56,8 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   // A ball touches tissue only where its slope is at most the steepest slope that links allow a surface.
   const double h = lattice_->min_spacing_m();
   double steepest = 0.0;
-  for (int d = 0; d < 3; ++d)
-    steepest = std::max(steepest, static_cast<double>(lattice_->tightest(d).across) / h);
+  for (const LinkMaterial& m : lattice_->materials().subspan(1))
+    steepest = std::max(steepest, m.shear * lattice_->max_spacing_m() / h);
   const double share = tool.shape == ToolInBody::Shape::punch ? 1.0 : steepest / std::hypot(1.0, steepest);
   const int contact = static_cast<int>(std::ceil(share * reach(tool.radius) / h));
   if (contact + kLeastMargin > CompositeGrid::kMaxHalfWidth) return "the tool is many voxels wide";
