@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "voxel/composite/anchor_chains.h"
 
+#include <algorithm>
 #include <bit>
+#include <cstdint>
 #include <limits>
 
 namespace voxel {

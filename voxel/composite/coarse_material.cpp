@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <cstring>
 #include <utility>
 
 #include "voxel/lattice/link_stiffness.h"
@@ -13,10 +12,8 @@ namespace {
 
 using composite::index;
 
-constexpr int kLevels = 12;  // levels of cubes
 // align_to() chooses an end if the voxel is further from the middle than size / (2 · kAlignFraction).
 constexpr int kAlignFraction = 4;
-constexpr int kMaxCubeEdge = 1 << (kLevels - 1);  // edge of the largest cubes (cells)
 
 // Is there a cell on any side of a link with these parallels (link_stiffness.h)?
 bool has_cell(std::uint32_t parallels) {
@@ -48,7 +45,7 @@ CoarseMaterial::CoarseMaterial(const Lattice& lattice) : lattice_(lattice), dims
   if (has_own_limits()) add_limits();
   mark_anchors();
   list_anchor_faces();
-  const std::size_t widest = index(*std::max_element(dims_.begin(), dims_.end())) + 2 * kMaxCubeEdge;
+  const std::size_t widest = index(*std::max_element(dims_.begin(), dims_.end())) + 2 * (1 << (kLevels - 1));
   voxel_scratch_.reserve(4 * widest);
 }
 
@@ -245,91 +242,6 @@ void CoarseMaterial::count_cells() {
   }
 }
 
-// Finds the stiffness of the smallest stored cubes. Along each axis, the 4 cells of a column are in series,
-// and the columns are in parallel. A column of n cells contributes n² / Σ compliance, so that n equal cells
-// contribute n times their stiffness.
-void CoarseMaterial::find_stiffness() {
-  CubeLevel& fine = levels_[kFirstLevel];
-  constexpr int kEdge = 1 << kFirstLevel;
-  const std::size_t cubes = index(fine.dims[0]) * index(fine.dims[1]) * index(fine.dims[2]);
-  for (auto& axis : fine.stiffness) axis.assign(cubes, 0.0F);
-  const int nx = fine.dims[0] * kEdge, ny = fine.dims[1] * kEdge;
-  const std::size_t area = index(nx) * index(ny);
-  std::vector<std::uint8_t> cells(area);
-  struct Column {
-    float cells = 0.0F, compliance = 0.0F;
-    [[nodiscard]] float in_series() const { return cells > 0.0F ? cells * cells / compliance : 0.0F; }
-  };
-  std::vector<Column> along_y(index(nx)), along_z(area);
-  std::vector<float> compliance;
-  for (const float s : stiffness_) compliance.push_back(s > 0.0F ? 1.0F / s : 0.0F);
-  for (int k = 0; k < fine.dims[2] * kEdge; ++k) {
-    cell_ranks(k, 0, nx, 0, ny, cells.data());
-    for (int j = 0; j < ny; ++j) {
-      const std::size_t row = fine.at({0, j / kEdge, k / kEdge});
-      const std::uint8_t* ranks = cells.data() + index(j) * index(nx);
-      Column along_x;
-      for (int i = 0; i < nx; ++i) {
-        const std::size_t cube = row + index(i / kEdge);
-        const std::uint8_t rank = ranks[i];
-        Column *const y = &along_y[index(i)], *const z = &along_z[index(j) * index(nx) + index(i)];
-        for (Column* const c : {&along_x, y, z}) {
-          c->cells += rank != 0 ? 1.0F : 0.0F;
-          c->compliance += compliance[rank];
-        }
-        const auto end = [&](int at, std::size_t d, Column& c) {
-          if (at % kEdge != kEdge - 1) return;
-          fine.stiffness[d][cube] += c.in_series();
-          c = {};
-        };
-        end(i, 0, along_x);
-        end(j, 1, *y);
-        end(k, 2, *z);
-      }
-    }
-  }
-  for (std::size_t m = kFirstLevel + 1; m < levels_.size(); ++m)
-    coarsen_stiffness(levels_[m - 1], levels_[m]);
-}
-
-// Adds up the limits of the cells in each stored cube.
-void CoarseMaterial::add_limits() {
-  constexpr int kEdge = 1 << kFirstLevel;
-  const auto allocate = [](CubeLevel& level) {
-    for (auto& limits : level.limits)
-      limits.assign(index(level.dims[0]) * index(level.dims[1]) * index(level.dims[2]), 0.0F);
-  };
-  CubeLevel& fine = levels_[kFirstLevel];
-  allocate(fine);
-  const int nx = fine.dims[0] * kEdge, ny = fine.dims[1] * kEdge;
-  std::vector<std::uint8_t> cells(index(nx) * index(ny));
-  for (int k = 0; k < fine.dims[2] * kEdge; ++k) {
-    cell_ranks(k, 0, nx, 0, ny, cells.data());
-    for (int j = 0; j < ny; ++j) {
-      const std::size_t row = fine.at({0, j / kEdge, k / kEdge});
-      for (int i = 0; i < nx; ++i) {
-        const std::uint8_t rank = cells[index(j) * index(nx) + index(i)];
-        for (std::size_t q = 0; rank != 0 && q < 3; ++q)
-          fine.limits[q][row + index(i / kEdge)] += limits_[rank][q];
-      }
-    }
-  }
-  for (std::size_t m = kFirstLevel + 1; m < levels_.size(); ++m) {
-    const CubeLevel& below = levels_[m - 1];
-    CubeLevel& coarse = levels_[m];
-    allocate(coarse);
-    Index3 b{};
-    for (b[2] = 0; b[2] < below.dims[2]; ++b[2]) {
-      for (b[1] = 0; b[1] < below.dims[1]; ++b[1]) {
-        for (b[0] = 0; b[0] < below.dims[0]; ++b[0]) {
-          for (std::size_t q = 0; q < 3; ++q)
-            coarse.limits[q][coarse.at({b[0] / 2, b[1] / 2, b[2] / 2})] += below.limits[q][below.at(b)];
-        }
-      }
-    }
-  }
-}
-
 // Cells in a cube of 2^m cells an edge.
 float CoarseMaterial::cell_count(const CubeLevel& level, int m, const Index3& cube) const noexcept {
   if (!level.in(cube)) return 0.0F;
@@ -342,38 +254,6 @@ float CoarseMaterial::cell_count(const CubeLevel& level, int m, const Index3& cu
     cells *= static_cast<float>(std::max(0, to - from));
   }
   return cells;
-}
-
-// Stiffness of cubes twice as large. Along an axis, the two cubes of a column are in series, and the four
-// columns are in parallel.
-void CoarseMaterial::coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse) const {
-  const int m = static_cast<int>(&below - levels_.data());
-  const std::size_t cubes = index(coarse.dims[0]) * index(coarse.dims[1]) * index(coarse.dims[2]);
-  for (auto& axis : coarse.stiffness) axis.assign(cubes, 0.0F);
-  Index3 b{};
-  for (b[2] = 0; b[2] < coarse.dims[2]; ++b[2]) {
-    for (b[1] = 0; b[1] < coarse.dims[1]; ++b[1]) {
-      for (b[0] = 0; b[0] < coarse.dims[0]; ++b[0]) {
-        for (std::size_t d = 0; d < 3; ++d) {
-          float sum = 0.0F;
-          for (int column = 0; column < 4; ++column) {
-            Index3 at{2 * b[0], 2 * b[1], 2 * b[2]};
-            at[(d + 1) % 3] += column & 1;
-            at[(d + 2) % 3] += column >> 1;
-            float cells = 0.0F, compliance = 0.0F;
-            for (int half = 0; half < 2; ++half, ++at[d]) {
-              const float here = cell_count(below, m, at);
-              if (here == 0.0F) continue;
-              cells += here;
-              compliance += here * here / below.stiffness[d][below.at(at)];
-            }
-            if (cells > 0.0F) sum += cells * cells / compliance;
-          }
-          coarse.stiffness[d][coarse.at(b)] = sum;
-        }
-      }
-    }
-  }
 }
 
 void CoarseMaterial::reserve_planes(std::size_t cubes) {
@@ -418,104 +298,6 @@ void CoarseMaterial::cell_counts(int m, int z, int first_x, int nx, int first_y,
       const std::uint8_t* from = cell_scratch_.data() + index(j) * index(wide);
       float* to = out + (j >> m) * nx;
       for (int i = 0; i < wide; ++i) to[i >> m] += from[i] != 0 ? 1.0F : 0.0F;
-    }
-  }
-}
-
-void CoarseMaterial::cell_stiffness(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept {
-  const std::size_t area = index(nx) * index(ny);
-  cell_scratch_.resize(area);
-  cell_ranks(z, first_x, nx, first_y, ny, cell_scratch_.data());
-  if (is_heterogeneous()) {
-    for (std::size_t n = 0; n < area; ++n) out[n] = stiffness_[cell_scratch_[n]];
-  } else {
-    for (std::size_t n = 0; n < area; ++n) out[n] = cell_scratch_[n] != 0 ? 1.0F : 0.0F;
-  }
-}
-
-void CoarseMaterial::cube_stiffness(int m, int z, int first_x, int nx, int first_y, int ny,
-                                    const std::array<float*, 3>& out) noexcept {
-  const std::size_t area = index(nx) * index(ny);
-  if (m == 0) {
-    cell_stiffness(z, first_x, nx, first_y, ny, out[0]);
-    for (std::size_t d = 1; d < 3; ++d) std::copy_n(out[0], area, out[d]);
-    return;
-  }
-  if (m >= kFirstLevel) {
-    const CubeLevel& level = levels_[index(std::min(m, kLevels - 1))];
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        const Index3 b{first_x + i, first_y + j, z};
-        const bool in = level.in(b);
-        const std::size_t at = in ? level.at(b) : 0;
-        for (std::size_t d = 0; d < 3; ++d) out[d][j * nx + i] = in ? level.stiffness[d][at] : 0.0F;
-      }
-    }
-    return;
-  }
-  // Cubes of eight cells. In most cubes all eight have the same stiffness.
-  const int wide = 2 * nx;
-  const std::size_t layer_of = index(wide) * index(2 * ny), ranks = stiffness_.size();
-  cell_scratch_.resize(2 * layer_of);
-  cell_ranks(2 * z, 2 * first_x, wide, 2 * first_y, 2 * ny, cell_scratch_.data());
-  cell_ranks(2 * z + 1, 2 * first_x, wide, 2 * first_y, 2 * ny, cell_scratch_.data() + layer_of);
-  for (int j = 0; j < ny; ++j) {
-    const std::uint8_t* const low = cell_scratch_.data() + index(2 * j) * index(wide);
-    for (int i = 0; i < nx; ++i) {
-      std::array<std::uint8_t, 8> c;
-      std::memcpy(c.data(), low + 2 * i, 2);
-      std::memcpy(c.data() + 2, low + wide + 2 * i, 2);
-      std::memcpy(c.data() + 4, low + layer_of + 2 * i, 2);
-      std::memcpy(c.data() + 6, low + layer_of + index(wide) + 2 * i, 2);
-      std::uint64_t all = 0;
-      std::memcpy(&all, c.data(), 8);
-      const std::size_t at = index(j) * index(nx) + index(i);
-      if (all == c[0] * 0x0101010101010101ULL) {
-        for (float* const axis : out) axis[at] = 8.0F * stiffness_[c[0]];
-        continue;
-      }
-      for (std::size_t d = 0; d < 3; ++d) {
-        float sum = 0.0F;
-        for (std::size_t n = 0; n < 8; ++n) {
-          if ((n >> d & 1U) == 0) sum += series_pair_[c[n] * ranks + c[n | std::size_t{1} << d]];
-        }
-        out[d][at] = sum;
-      }
-    }
-  }
-}
-
-void CoarseMaterial::voxel_limits(const Index3& p, int nx, const std::array<float*, 3>& out) noexcept {
-  voxel_scratch_.resize(index(nx));
-  voxel_ranks(p[0] - offset_[0], nx, p[1] - offset_[1], p[2] - offset_[2], voxel_scratch_.data());
-  for (int i = 0; i < nx; ++i) {
-    for (std::size_t q = 0; q < 3; ++q) out[q][i] = limits_[voxel_scratch_[index(i)]][q];
-  }
-}
-
-void CoarseMaterial::cube_limits(int m, int z, int first_x, int nx, int first_y, int ny,
-                                 const std::array<float*, 3>& out) noexcept {
-  if (m >= kFirstLevel) {
-    const CubeLevel& level = levels_[index(std::min(m, kLevels - 1))];
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        const Index3 b{first_x + i, first_y + j, z};
-        const bool in = level.in(b);
-        for (std::size_t q = 0; q < 3; ++q) out[q][j * nx + i] = in ? level.limits[q][level.at(b)] : 0.0F;
-      }
-    }
-    return;
-  }
-  const int edge = 1 << m, wide = nx * edge, high_y = ny * edge;
-  cell_scratch_.resize(index(wide) * index(high_y));
-  for (float* const limits : out) std::fill_n(limits, nx * ny, 0.0F);
-  for (int k = z * edge; k < (z + 1) * edge; ++k) {
-    cell_ranks(k, first_x * edge, wide, first_y * edge, high_y, cell_scratch_.data());
-    for (int j = 0; j < high_y; ++j) {
-      for (int i = 0; i < wide; ++i) {
-        const std::uint8_t rank = cell_scratch_[index(j) * index(wide) + index(i)];
-        for (std::size_t q = 0; rank != 0 && q < 3; ++q) out[q][(j >> m) * nx + (i >> m)] += limits_[rank][q];
-      }
     }
   }
 }

@@ -118,6 +118,7 @@ class CoarseMaterial {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
+  static constexpr int kLevels = 12;           // levels of cubes
   static constexpr int kFirstLevel = 2;        // level of the smallest cubes whose counts are stored
   static constexpr int kFirstAnchorLevel = 3;  // level of the smallest cubes with anchor marks
   struct CubeLevel {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "voxel/composite/grid.h"
+#include "voxel/composite/row_kernels.h"
 
 namespace voxel {
 namespace {

@@ -13,133 +13,28 @@
 #include <iostream>
 #include <memory>
 
-#include "tests/voxel/composite/slack_material.h"
-#include "tests/voxel/fixtures/direct_solution.h"
+#include "tests/voxel/composite/body_on_grid.h"
 #include "tests/voxel/fixtures/lattice_scenes.h"
 
 namespace {
 
+using tests::below;
 using tests::block;
+using tests::Body;
+using tests::compare;
+using tests::Difference;
+using tests::everywhere;
 using tests::kSpacing;
 using tests::made_of;
+using tests::patches_against_all;
+using tests::press;
+using tests::PressedSquare;
 using tests::slack;
 using voxel::CompositeGrid;
 using voxel::Lattice;
 using voxel::LinkMaterial;
 using voxel::VoxelId;
 using Index3 = CompositeGrid::Index3;
-
-// A body that is given voxel by voxel: `filled` and `anchored` decide for each voxel. `tissue` gives its
-// Young's modulus in units of 10 kPa; if null, there is one tissue. `adjust` may change the other values of a
-// tissue.
-struct Body {
-  voxel::LatticeOptions options;
-  std::shared_ptr<const Lattice> lattice;
-
-  Body(const Index3& dims, double play, const std::function<bool(const Index3&)>& filled,
-       const std::function<bool(const Index3&)>& anchored,
-       const std::function<int(const Index3&)>& tissue = nullptr,
-       const std::function<void(int, LinkMaterial&)>& adjust = nullptr)
-      : options(made_of(slack(play), nullptr)) {
-    voxel::LabelVolume volume = block(dims, glm::dvec3(kSpacing));
-    std::size_t n = 0;
-    for (int k = 0; k < dims[2]; ++k) {
-      for (int j = 0; j < dims[1]; ++j) {
-        for (int i = 0; i < dims[0]; ++i, ++n) {
-          volume.labels[n] = filled({i, j, k}) ? 1 : 0;
-          if (tissue && volume.labels[n] != 0) {
-            volume.labels[n] = static_cast<std::uint8_t>(tissue({i, j, k}));
-            LinkMaterial& material = options.materials[volume.labels[n]];
-            material.young_Pa = 1e4 * volume.labels[n];
-            if (adjust) adjust(volume.labels[n], material);
-          }
-          if (volume.labels[n] != 0 && anchored({i, j, k})) options.anchor_voxels.push_back(n);
-        }
-      }
-    }
-    lattice = std::make_shared<Lattice>(std::move(volume), options);
-  }
-};
-
-bool everywhere(const Index3&) {
-  return true;
-}
-bool below(const Index3& p) {
-  return p[2] == 0;
-}
-
-// A square of voxels of the top, pressed down by `depth` (m).
-struct PressedSquare {
-  Index3 middle;
-  int half;
-  double depth;
-
-  template <class Visit>
-  void for_voxels(const Visit& visit) const {
-    for (int j = -half; j <= half; ++j) {
-      for (int i = -half; i <= half; ++i) visit(Index3{middle[0] + i, middle[1] + j, middle[2]});
-    }
-  }
-};
-
-void press(CompositeGrid& grid, const PressedSquare& patch, int cycles) {
-  for (int n = 0; n < cycles; ++n) {
-    grid.clear_pressed();
-    patch.for_voxels([&](const Index3& p) {
-      grid.press(p, glm::dvec3(0.0, 0.0, -patch.depth), glm::dvec3(0.0, 0.0, -1.0));
-    });
-    grid.cycle({false, false, true});
-  }
-}
-
-// Direct solution with the lattice's links and their limits, by sparse Cholesky factorisation and an
-// augmented Lagrangian. Here the square sticks to the tool. This makes no difference, because the tissue
-// pushes every voxel of the square against the tool.
-tests::Problem solved_directly(const Body& body, const PressedSquare& patch) {
-  voxel::Displacement state(*body.lattice);
-  patch.for_voxels([&](const Index3& p) {
-    const VoxelId v = body.lattice->at(p[0], p[1], p[2]);
-    state.u[2][v] = static_cast<float>(-patch.depth);
-    state.set_role(v, voxel::Displacement::held);
-  });
-  tests::Problem problem = tests::problem_of(*body.lattice, body.options, state, 2);
-  tests::solve_with_limits(problem, kSpacing);
-  return problem;
-}
-
-double force_of(const Body& body, const tests::Problem& problem) {
-  double force = 0.0;
-  for (std::size_t i = 0; i < problem.links.size(); ++i) {
-    const tests::Link& l = problem.links[i];
-    if (body.lattice->anchored(l.a) == body.lattice->anchored(l.b)) continue;
-    const double tension = l.k * (problem.u[l.b] - problem.u[l.a]) + problem.limit_N[i];
-    force += body.lattice->anchored(l.a) ? -tension : tension;
-  }
-  return force;
-}
-
-struct Difference {
-  double displacement = 0.0, force = 0.0;  // relative to the depth; relative to the force
-};
-Difference compare(const Body& body, const PressedSquare& patch, int half_width) {
-  const tests::Problem direct = solved_directly(body, patch);
-  CompositeGrid grid(*body.lattice, half_width);
-  grid.begin(patch.middle);
-  press(grid, patch, 100);
-  Difference most;
-  for (std::size_t i = 0; i < body.lattice->size(); ++i) {
-    const auto v = static_cast<VoxelId>(i);
-    if (!body.lattice->filled(v)) continue;
-    const double error = std::fabs(grid.at(body.lattice->coordinates(v)).z - direct.u[i]);
-    most.displacement = std::max(most.displacement, error / patch.depth);
-  }
-  const double force = force_of(body, direct);
-  most.force = std::fabs(grid.force_on_tool_N().z - force) / force;
-  std::cout << "[ measured ] " << force << " N; off by " << most.displacement << " of the depth, "
-            << most.force << " of the force; links beyond by " << grid.worst_violation() / kSpacing
-            << " spacings\n";
-  return most;
-}
 
 // If level 0 covers the object, the result is the lattice's equilibrium, whatever the object's dimensions.
 TEST(CompositeGrid, AllVoxelsAreTheLatticeAtEquilibrium) {
@@ -193,87 +88,6 @@ TEST(CompositeGrid, SheetsOfSingleVoxelsAreInTheLinks) {
   EXPECT_LT(d.force, 0.02);
 }
 
-// Layers and lumps of tissues whose stiffnesses differ by factors of 4 to 200. Soft layers between stiff ones
-// reach their limits. The depth is a fraction of that at which all links below the square do so.
-int stiff_soft_stiff(const Index3& p) {
-  return p[2] < 4 || p[2] >= 9 ? 4 : 1;
-}
-int soft_stiff_soft(const Index3& p) {
-  return p[2] < 4 || p[2] >= 9 ? 1 : 10;
-}
-int stiffer_soft_stiffer(const Index3& p) {
-  return p[2] < 4 || p[2] >= 9 ? 10 : 1;
-}
-int skin_fat_muscle(const Index3& p) {
-  return p[2] >= 9 ? 31 : p[2] >= 4 ? 1 : 3;
-}
-int lumps_of_200(const Index3& p) {
-  return ((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 2 == 0 ? 200 : 1;
-}
-int lumps(const Index3& p) {
-  return 1 + 4 * (((p[0] + 2) / 5 + (p[1] + 1) / 4 + (p[2] + 2) / 5) % 3);
-}
-
-TEST(CompositeGrid, SeveralTissuesAreTheLatticeAtEquilibrium) {
-  const Index3 dims{13, 13, 13};
-  for (const auto& tissue :
-       {stiff_soft_stiff, soft_stiff_soft, stiffer_soft_stiffer, lumps, skin_fat_muscle, lumps_of_200}) {
-    for (const double depth : {0.3, 0.7, 0.9}) {
-      const Body body(dims, 0.15, everywhere, below, tissue);
-      const PressedSquare patch{{6, 6, 12}, 2, depth * 0.15 * 12 * kSpacing};
-      const Difference d = compare(body, patch, CompositeGrid::kRefineAll);
-      EXPECT_LT(d.displacement, 0.01);
-      EXPECT_LT(d.force, 0.01);
-    }
-  }
-}
-
-void set_play(LinkMaterial& material, double shorter, double longer, double shear) {
-  material.stretch_min = 1.0 - shorter;
-  material.stretch_max = 1.0 + longer;
-  material.shear = shear;
-}
-
-// Tissues whose limits differ, pressed into their limits. The softer tissue has the tighter limits, the
-// stiffer one has, or both have the same stiffness.
-TEST(CompositeGrid, TissuesWithLimitsOfTheirOwnAreTheLatticeAtEquilibrium) {
-  const Index3 dims{13, 13, 13};
-  const auto of_soft = [](int label, LinkMaterial& m) { label == 1 ? set_play(m, 0.05, 0.1, 0.08) : void(); };
-  const auto of_stiff = [](int label, LinkMaterial& m) {
-    label != 1 ? set_play(m, 0.06, 0.03, 0.04) : void();
-  };
-  const auto of_one_stiffness = [](int label, LinkMaterial& m) {
-    m.young_Pa = 1e4;
-    if (label != 1) set_play(m, 0.05, 0.05, 0.05);
-  };
-  for (const auto& tissue : {stiff_soft_stiff, soft_stiff_soft, lumps}) {
-    for (const auto& adjust : std::initializer_list<std::function<void(int, LinkMaterial&)>>{
-             of_soft, of_stiff, of_one_stiffness}) {
-      for (const double depth : {0.3, 0.6}) {
-        const Body body(dims, 0.15, everywhere, below, tissue, adjust);
-        ASSERT_FALSE(body.lattice->uniform_limits());
-        const PressedSquare patch{{6, 6, 12}, 2, depth * 0.08 * 12 * kSpacing};
-        const Difference d = compare(body, patch, CompositeGrid::kRefineAll);
-        EXPECT_LT(d.displacement, 0.01);
-        EXPECT_LT(d.force, 0.01);
-      }
-    }
-  }
-}
-
-// Nested patches against all voxels, with a pressed square as large as a tool's contact.
-double patches_against_all(const Body& body, const PressedSquare& patch, int cycles = 25) {
-  CompositeGrid all(*body.lattice, CompositeGrid::kRefineAll), patches(*body.lattice, 10);
-  all.begin(patch.middle);
-  patches.begin(patch.middle);
-  press(all, patch, cycles);
-  press(patches, patch, cycles);
-  const double share = patches.force_on_tool_N().z / all.force_on_tool_N().z - 1.0;
-  std::cout << "[ measured ] " << all.force_on_tool_N().z << " N of all voxels, boxes " << 100.0 * share
-            << " %\n";
-  return std::fabs(share);
-}
-
 TEST(CompositeGrid, PatchesAreWithinAFewPartsInAHundredOfAllVoxels) {
   for (const int n : {57, 64, 70}) {
     const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
@@ -290,79 +104,6 @@ TEST(CompositeGrid, PatchesInOtherShapes) {
   EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, notched, below), patch), 0.05);
   const auto hollow = [](const Index3& p) { return std::hypot(p[0] - 30.0, p[2] - 22.0) > 9.0; };
   EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, hollow, below), patch), 0.07);
-}
-
-TEST(CompositeGrid, PatchesInSeveralTissues) {
-  const int n = 64;
-  const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
-  const auto layers = [](const Index3& p) { return p[2] < 32 ? 2 : p[2] < 60 ? 1 : 4; };
-  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, layers), patch), 0.04);
-  const auto lumps = [](const Index3& p) { return (p[0] / 9 + p[1] / 7 + p[2] / 8) % 2 == 0 ? 1 : 5; };
-  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, lumps), patch), 0.05);
-  const auto core = [](const Index3& p) {
-    return std::hypot(p[0] - 31.5, p[1] - 31.5, p[2] - 40.0) < 12.0 ? 10 : 1;
-  };
-  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, core), patch), 0.04);
-}
-
-// The lattice's limits are those of its voxels, a coarse level's are means over the tissue round its nodes.
-TEST(CompositeGrid, PatchesInTissuesWithLimitsOfTheirOwn) {
-  const int n = 64;
-  const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
-  const auto tight = [](int label, LinkMaterial& m) {
-    if (label > 1) set_play(m, 0.05, 0.03, 0.04);
-  };
-  const auto layers = [](const Index3& p) { return p[2] < 32 ? 2 : p[2] < 60 ? 1 : 4; };
-  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, layers, tight), patch), 0.04);
-  const auto lumps = [](const Index3& p) { return (p[0] / 9 + p[1] / 7 + p[2] / 8) % 2 == 0 ? 1 : 5; };
-  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, lumps, tight), patch), 0.07);
-  const auto core = [](const Index3& p) {
-    return std::hypot(p[0] - 31.5, p[1] - 31.5, p[2] - 40.0) < 12.0 ? 10 : 1;
-  };
-  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, core, tight), patch), 0.04);
-}
-
-// Skin on fat on muscle, and larger contrasts.
-TEST(CompositeGrid, PatchesInTissuesThatDifferMuch) {
-  const int n = 64;
-  const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
-  // Skin, fat, muscle.
-  for (const auto& stiff : {std::array{31, 1, 3}, {100, 1, 10}, {1, 100, 10}, {3, 200, 11}}) {
-    const auto layers = [&](const Index3& p) {
-      return p[2] < 32 ? stiff[2] : p[2] < 60 ? stiff[1] : stiff[0];
-    };
-    EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, layers), patch), 0.05)
-        << stiff[0] << ":" << stiff[1] << ":" << stiff[2];
-  }
-}
-
-// Stiffness of cubes of 1 to 32 cells per edge: layers act in series across them, and in parallel along them.
-TEST(CompositeGrid, CubesAreAsStiffAsTheirLayers) {
-  const int n = 33;
-  const auto layers = [](const Index3& p) { return p[2] <= 16 ? 1 : 4; };
-  const Body body({n, n, n}, 0.1, everywhere, below, layers);
-  voxel::CoarseMaterial cells(*body.lattice);
-  cells.reserve_planes(n + 1);
-  for (const int m : {0, 1, 2, 3, 4, 5}) {
-    const int edge = 1 << m, count = 32 / edge;
-    const auto area = static_cast<std::size_t>(count) * static_cast<std::size_t>(count);
-    std::array<std::vector<float>, 3> stiff;
-    for (auto& axis : stiff) axis.resize(area);
-    for (int z = 0; z < count; ++z) {
-      cells.cube_stiffness(m, z, 0, count, 0, count, {stiff[0].data(), stiff[1].data(), stiff[2].data()});
-      // A cell between two layers is as stiff as the softer layer.
-      double across = 0.0, yields = 0.0;
-      for (int k = z * edge; k < (z + 1) * edge; ++k) {
-        across += k <= 16 ? 1.0 : 4.0;
-        yields += k <= 16 ? 1.0 : 0.25;
-      }
-      for (std::size_t c = 0; c < area; ++c) {
-        EXPECT_NEAR(stiff[0][c], edge * edge * across, 1e-5 * edge * edge * across);
-        EXPECT_NEAR(stiff[1][c], edge * edge * across, 1e-5 * edge * edge * across);
-        EXPECT_NEAR(stiff[2][c], std::pow(edge, 4) / yields, 1e-5 * std::pow(edge, 4) / yields) << m;
-      }
-    }
-  }
 }
 
 // The result does not depend on where the patches were before, or on the path of the tool.
