@@ -15,6 +15,7 @@
 #include "hybrid/program/commands.h"
 #include "hybrid/program/did_you_mean.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/program_pages.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/scene/table_reader.h"
 
@@ -413,7 +414,7 @@ int main(int argc, char** argv) {
   hybrid::end_at_once_on_signals();
   CLI::App app(kAbout, "hybrid");
   app.require_subcommand(1);
-  app.set_version_flag("--version", HYBRID_VERSION);
+  hybrid::add_pages(app, HYBRID_VERSION);
   int status = 0;
   typed_command() = hybrid::command_line(argc, argv);
   add_run(app, status);
@@ -430,8 +431,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    const bool wanted = app.exit(e) == 0;  // the user asked for --help or --version
-    if (wanted) return flushed(0);
+    if (app.exit(e) == 0) return flushed(0);  // the user asked for --help, --version or a page
     std::fputs(hybrid::did_you_mean(app, {argv + 1, argv + argc}).c_str(), stderr);
     return 2;
   } catch (const device::StopAsked& asked) {
