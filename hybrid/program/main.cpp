@@ -78,7 +78,7 @@ void add_run(CLI::App& app, int& status) {
   sub->add_option("--black-box", c->black_box,
                   "where the 2 s around the first fault go; default in real time: SCENE-fault.csv here");
   sub->add_option("--save-surface", c->save_surface,
-                  "write all surfaces as they are at the end, scene frame, as STL or OBJ (mm) or PLY (m)");
+                  "write all surfaces as they are at the end: STL, OBJ (mm), PLY, GLB (m)");
   sub->add_option("--save-volume", c->save_volume,
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
   add_report(*sub, c->report);
