@@ -46,9 +46,9 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
 
-# Pictures need OpenGL, which is loaded at run time, and a font. scenes/head.toml needs mricron-data.
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libegl1, libgl1-mesa-dri, fonts-dejavu-core")
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "mricron-data, python3-hybrid")
+# Pictures need OpenGL, which is loaded at run time, and a font; scenes/head.toml needs the head of mricron-data.
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libegl1, libgl1-mesa-dri, fonts-dejavu-core, mricron-data")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "python3-hybrid")
 set(of_this_build "libhybrid${HYBRID_ABI_VERSION} (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "${of_this_build}")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "${of_this_build}, python3, python3-numpy")

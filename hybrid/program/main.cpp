@@ -28,7 +28,7 @@ constexpr const char* kAbout =
     "  hybrid view scenes/head.toml                                     a window; drag the tool\n"
     "  hybrid check skull.stl ct.nii.gz my-scene.toml                   the contents and faults of files\n"
     "  hybrid compose --labels labels.nii.gz --names labels.csv --out body   a scene from a scan\n\n"
-    "A scene is one small text file; scenes/README.md describes its keys.\n"
+    "A scene is one small text file; scenes/README.md has its keys. Packages: /usr/share/hybrid/scenes.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage, 130 Ctrl-C.";
 
 // The command line as it was typed. main() sets it once.
