@@ -45,7 +45,7 @@ void print_text(std::ostream& page, const std::string& text) {
 }
 
 // What an option or an argument takes, as in its help: "INT in [0 - 1000000]", "{quick,full}".
-std::string values(const CLI::Option& option) {
+std::string option_values(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   const std::size_t set = type.find('{');
   if (set != std::string::npos) return type.substr(set, type.find('}') - set + 1);
@@ -54,7 +54,7 @@ std::string values(const CLI::Option& option) {
   return range == std::string::npos ? kind : kind + type.substr(range);
 }
 
-std::string names(const CLI::Option& option) {
+std::string option_names(const CLI::Option& option) {
   std::string out;
   for (const std::string& name : option.get_snames()) out += (out.empty() ? "-" : ", -") + name;
   for (const std::string& name : option.get_lnames()) out += (out.empty() ? "--" : ", --") + name;
@@ -65,10 +65,10 @@ void print_option(std::ostream& page, const CLI::Option& option) {
   page << ".TP\n";
   if (option.get_positional()) {
     page << "\\fI" << roff(option.get_name(true)) << "\\fR";
-    if (option.get_type_name().find('{') != std::string::npos) page << ' ' << roff(values(option));
+    if (option.get_type_name().find('{') != std::string::npos) page << ' ' << roff(option_values(option));
   } else {
-    page << "\\fB" << roff(names(option)) << "\\fR";
-    if (option.get_items_expected_max() > 0) page << " \\fI" << roff(values(option)) << "\\fR";
+    page << "\\fB" << roff(option_names(option)) << "\\fR";
+    if (option.get_items_expected_max() > 0) page << " \\fI" << roff(option_values(option)) << "\\fR";
   }
   page << '\n' << roff(option.get_description());
   if (!option.get_default_str().empty()) page << "; default: " << roff(option.get_default_str());

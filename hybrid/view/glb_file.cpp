@@ -100,8 +100,8 @@ glm::dvec3 middle_of(const polygon::TriangleMesh& mesh) {
 }
 
 // Adds the mesh, its arrays and its node; returns the number of the node.
-std::size_t add_object(Json& gltf, GlbBuffer& buffer, const std::string& name, const DrawMesh& draw,
-                       const glm::dvec3& middle_m, const std::vector<VertexColour>& colours) {
+std::size_t add_glb_object(Json& gltf, GlbBuffer& buffer, const std::string& name, const DrawMesh& draw,
+                           const glm::dvec3& middle_m, const std::vector<VertexColour>& colours) {
   std::vector<glm::vec3> positions, normals, linear_colours;
   for (const DrawVertex& v : draw.vertices) {
     positions.push_back(v.position);
@@ -145,7 +145,7 @@ void add_objects(Json& gltf, GlbBuffer& buffer, const DrawnScene& scene, const S
     if (draw.indices.empty()) continue;  // glTF has no empty arrays
     const std::vector<VertexColour> colours = colours_of_vertices(scene, o);
     add_material(gltf, object.name, colours.empty() ? palette::of_object(scene, o) : glm::vec3(1.0F));
-    children.push_back(add_object(gltf, buffer, object.name, draw, middle_m, colours));
+    children.push_back(add_glb_object(gltf, buffer, object.name, draw, middle_m, colours));
   }
   // A turn by -90 degrees about x: the scene's z becomes y.
   gltf["nodes"].push_back({{"name", scene.title},
