@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What `cmake --install` installs, in four components, and the Debian packages that `cpack` makes of them.
+# What `cmake --install` installs, in four components. HybridDebian.cmake makes a Debian package of each.
 include(CMakePackageConfigHelpers)
 
 set(HYBRID_PYTHON_DIR "lib/python3/dist-packages" CACHE STRING "Where the Python module is installed, below the prefix")
@@ -9,6 +9,7 @@ install(TARGETS hybrid_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPO
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/hybrid/scenes COMPONENT program PATTERN demo.sh EXCLUDE)
 install(TARGETS hybrid_c EXPORT hybrid-targets ${in_library})
 install(FILES interface/hybrid.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
+install(FILES interface/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development)
 install(DIRECTORY interface/examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development)
 install(FILES interface/hybrid.py DESTINATION ${HYBRID_PYTHON_DIR} COMPONENT python)
 
@@ -25,23 +26,19 @@ string(REGEX REPLACE "/$" "" to_prefix "${to_prefix}")
 configure_file(cmake/hybrid.pc.in hybrid.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/hybrid.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
 
-set(CPACK_GENERATOR DEB)
-set(CPACK_PACKAGE_VENDOR "hybrid")
-set(CPACK_PACKAGE_CONTACT "hybrid maintainers <maintainers@users.noreply.h-seed-f46bce07.example>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Haptic renderer for scenes of rigid and soft objects")
-set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_STRIP_FILES ON)
-set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_GROUPING IGNORE)
-set(CPACK_COMPONENTS_ALL program library development python)
-set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME hybrid)
-set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libhybrid${HYBRID_ABI_VERSION})
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libhybrid-dev)
-set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-hybrid)
-set(of_this_build "libhybrid${HYBRID_ABI_VERSION} (= ${PROJECT_VERSION})")
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "${of_this_build}")
-set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "${of_this_build}, python3-numpy")
-include(CPack)
+# hybrid_gzip(FILE NAME): compresses the file in every build. -n: no time in it, so that equal builds give equal bytes.
+function(hybrid_gzip file name)
+  add_custom_command(OUTPUT ${name} COMMAND gzip -9nc "${file}" > ${name} DEPENDS "${file}" VERBATIM)
+  string(REPLACE "." "_" target compressed_${name})
+  add_custom_target(${target} ALL DEPENDS ${name})
+endfunction()
+
+# The manual page and the completions, as the program prints them.
+add_custom_command(OUTPUT hybrid.1 hybrid.bash COMMAND hybrid_program --man-page > hybrid.1
+                   COMMAND hybrid_program --bash-completion > hybrid.bash DEPENDS hybrid_program VERBATIM)
+hybrid_gzip(${CMAKE_CURRENT_BINARY_DIR}/hybrid.1 hybrid.1.gz)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/hybrid.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/hybrid.bash RENAME hybrid COMPONENT program
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+
+include(HybridDebian)

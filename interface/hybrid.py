@@ -277,6 +277,9 @@ class Session:
         )
         return self
 
+    def __repr__(self) -> str:
+        return f"<hybrid.Session: {len(self.objects)} objects, a tick every {1e3 * self.period_s:g} ms>"
+
     @staticmethod
     def _options(relaxation: str, rate_hz: Optional[float], record: int, surfaces: bool, error: bool) -> Any:
         if relaxation not in _RELAXATIONS:

@@ -15,6 +15,7 @@
 #include "hybrid/program/commands.h"
 #include "hybrid/program/did_you_mean.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/program_pages.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/scene/table_reader.h"
 
@@ -27,7 +28,7 @@ constexpr const char* kAbout =
     "  hybrid view scenes/head.toml                                     a window; drag the tool\n"
     "  hybrid check skull.stl ct.nii.gz my-scene.toml                   the contents and faults of files\n"
     "  hybrid compose --labels labels.nii.gz --names labels.csv --out body   a scene from a scan\n\n"
-    "A scene is one small text file; scenes/README.md describes its keys.\n"
+    "A scene is one small text file; scenes/README.md has its keys. Packages: /usr/share/hybrid/scenes.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage, 130 Ctrl-C.";
 
 // The command line as it was typed. main() sets it once.
@@ -77,7 +78,7 @@ void add_run(CLI::App& app, int& status) {
   sub->add_option("--black-box", c->black_box,
                   "where the 2 s around the first fault go; default in real time: SCENE-fault.csv here");
   sub->add_option("--save-surface", c->save_surface,
-                  "write all surfaces as they are at the end, scene frame, as STL or OBJ (mm) or PLY (m)");
+                  "write all surfaces as they are at the end: STL, OBJ (mm), PLY, GLB (m)");
   sub->add_option("--save-volume", c->save_volume,
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
   add_report(*sub, c->report);
@@ -413,7 +414,7 @@ int main(int argc, char** argv) {
   hybrid::end_at_once_on_signals();
   CLI::App app(kAbout, "hybrid");
   app.require_subcommand(1);
-  app.set_version_flag("--version", HYBRID_VERSION);
+  hybrid::add_pages(app, HYBRID_VERSION);
   int status = 0;
   typed_command() = hybrid::command_line(argc, argv);
   add_run(app, status);
@@ -430,8 +431,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    const bool wanted = app.exit(e) == 0;  // the user asked for --help or --version
-    if (wanted) return flushed(0);
+    if (app.exit(e) == 0) return flushed(0);  // the user asked for --help, --version or a page
     std::fputs(hybrid::did_you_mean(app, {argv + 1, argv + argc}).c_str(), stderr);
     return 2;
   } catch (const device::StopAsked& asked) {

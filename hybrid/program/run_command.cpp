@@ -22,7 +22,9 @@
 #include "hybrid/session/report.h"
 #include "hybrid/session/session.h"
 #include "hybrid/session/trace_file.h"
+#include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
+#include "hybrid/view/glb_file.h"
 #include "hybrid/view/picture.h"
 
 namespace hybrid {
@@ -49,7 +51,7 @@ void ask_outputs(const RunCommand& command, const Scene& scene, Outputs& outputs
   outputs.ask("--picture", command.picture, {".png"});
   require_ending_of_none("--record", command.record);
   outputs.ask("--record", command.record, {});
-  outputs.ask("--save-surface", command.save_surface, {".ply", ".stl", ".obj"});
+  outputs.ask("--save-surface", command.save_surface, {".ply", ".stl", ".obj", ".glb"});
   outputs.ask("--black-box", command.black_box, {".csv", ".txt"});
   if (!command.save_volume.empty()) {
     for (const auto& file : saved_volume_names(command.save_volume, scene))
@@ -159,7 +161,12 @@ int run(const RunCommand& command) {
         plotted_objects(drawn_scene(scene, built, title), result.rows, result.object_force_N);
     save_session_plot(file, result.rows, objects, title, {.near = result.clearance, .period_s = result.dt_s});
   });
-  outputs.write("surface", command.save_surface, [&](const Path& file) { save_surfaces(file, built); });
+  outputs.write("surface", command.save_surface, [&](const Path& file) {
+    if (lower_ending(file) != ".glb") return save_surfaces(file, built);
+    Snapshot now;
+    fill_moved(*built.world, *built.state, now);
+    save_glb(file, drawn_scene(scene, built, title), now);
+  });
   outputs.attempt([&] {
     if (command.save_volume.empty()) return;
     for (const Path& file : save_volumes(command.save_volume, scene, built)) outputs.wrote("volume", file);

@@ -10,6 +10,7 @@
 #include <limits>
 #include <set>
 
+#include "hybrid/scene/itk_transform.h"
 #include "hybrid/scene/read_feel.h"
 #include "hybrid/scene/read_motion.h"
 
@@ -115,7 +116,33 @@ std::string read_name(const TableReader& table) {
   return name;
 }
 
+// The pose of a transform file, which leaves no room for other keys.
+Pose read_transform(const TableReader& table) {
+  for (const std::string_view other : {"position", "rotation"}) {
+    if (table.has(other))
+      table.refuse(other, words("'transform' and '", other, "' both say where ", table.what(), " lies"),
+                   "keep one of them");
+  }
+  const std::filesystem::path file = table.file("transform", false);
+  if (file.empty()) return {};  // refused already
+  Pose pose;
+  std::string wrong;
+  try {
+    pose = load_itk_transform(file);
+  } catch (const std::runtime_error& error) {
+    wrong = error.what();
+  }
+  const std::string name = words("'transform' in ", table.what(), ": '", printable(file.string(), 300), "' ");
+  const std::size_t remedy = wrong.find("; ");
+  if (!wrong.empty()) table.refuse("transform", name + wrong.substr(0, remedy), wrong.substr(remedy + 2));
+  const double most = table.source().length().upper;
+  if (glm::length(pose.position_m) > most)
+    table.refuse("transform", words(name, "moves by more than ", in_words(most), " m"), "correct it");
+  return pose;
+}
+
 Pose read_pose(const TableReader& table) {
+  if (table.has("transform")) return read_transform(table);
   Pose pose;
   pose.position_m = table.vector("position", table.source().length(), pose.position_m);
   const Quantity angle{"an angle in degrees", "90", 1.0, -36000.0, 36000.0};
@@ -195,17 +222,21 @@ std::string_view source_key(const TableReader& table, std::span<const std::strin
 }
 
 RigidDescription read_rigid(const SceneSource& source, const TreeNode& table, std::size_t number) {
-  static constexpr std::string_view of_all[] = {
-      "name", "mesh",   "primitive", "volume", "position", "rotation", "unit",   "repair",  "radius",
-      "size", "length", "labels",    "range",  "spacing",  "grow",     "smooth", "largest", "cut"};
-  static constexpr std::string_view of_mesh[] = {"name", "mesh", "unit", "repair", "position", "rotation"};
-  static constexpr std::string_view of_ball[] = {"name", "primitive", "radius", "position", "rotation"};
-  static constexpr std::string_view of_box[] = {"name", "primitive", "size", "position", "rotation"};
-  static constexpr std::string_view of_capsule[] = {"name",   "primitive", "radius",
-                                                    "length", "position",  "rotation"};
-  static constexpr std::string_view of_volume[] = {"name",    "volume",  "unit",     "labels",
-                                                   "range",   "spacing", "grow",     "smooth",
-                                                   "largest", "cut",     "position", "rotation"};
+  static constexpr std::string_view of_all[] = {"name",     "mesh",      "primitive", "volume", "position",
+                                                "rotation", "transform", "unit",      "repair", "radius",
+                                                "size",     "length",    "labels",    "range",  "spacing",
+                                                "grow",     "smooth",    "largest",   "cut"};
+  static constexpr std::string_view of_mesh[] = {"name",     "mesh",     "unit",     "repair",
+                                                 "position", "rotation", "transform"};
+  static constexpr std::string_view of_ball[] = {"name",     "primitive", "radius",
+                                                 "position", "rotation",  "transform"};
+  static constexpr std::string_view of_box[] = {"name",     "primitive", "size",
+                                                "position", "rotation",  "transform"};
+  static constexpr std::string_view of_capsule[] = {"name",     "primitive", "radius",   "length",
+                                                    "position", "rotation",  "transform"};
+  static constexpr std::string_view of_volume[] = {"name",     "volume",   "unit",     "labels",  "range",
+                                                   "spacing",  "grow",     "smooth",   "largest", "cut",
+                                                   "position", "rotation", "transform"};
   static constexpr std::string_view sources[] = {"mesh", "primitive", "volume"};
   static constexpr std::string_view shapes[] = {"ball", "box", "plane", "capsule"};
   static constexpr std::span<const std::string_view> of_shape[] = {of_ball, of_box, of_box, of_capsule};

@@ -240,18 +240,19 @@ Thinning read_thinning(const TableReader& soft, const std::set<int>& known) {
 }
 
 SoftSource read_source(const TableReader& table, std::string_view kind) {
-  static constexpr std::string_view of_mesh[] = {"name",     "mesh",     "unit",      "repair",  "spacing",
-                                                 "energy",   "material", "materials", "anchors", "budget",
-                                                 "thinning", "model",    "position",  "rotation"};
+  static constexpr std::string_view of_mesh[] = {
+      "name",    "mesh",   "unit",     "repair", "spacing",  "energy",   "material", "materials",
+      "anchors", "budget", "thinning", "model",  "position", "rotation", "transform"};
   static constexpr std::string_view of_volume[] = {
-      "name",     "volume",    "unit",    "labels", "range",    "ranges", "largest",  "spacing", "energy",
-      "material", "materials", "anchors", "budget", "thinning", "model",  "position", "rotation"};
+      "name",    "volume",   "unit",   "labels",   "range",     "ranges",
+      "largest", "spacing",  "energy", "material", "materials", "anchors",
+      "budget",  "thinning", "model",  "position", "rotation",  "transform"};
   static constexpr std::string_view of_block[] = {
-      "name",     "formula",   "size",    "spacing", "label",    "layers", "inclusions", "energy",
-      "material", "materials", "anchors", "budget",  "thinning", "model",  "position",   "rotation"};
+      "name",      "formula", "size",   "spacing",  "label", "layers",   "inclusions", "energy",   "material",
+      "materials", "anchors", "budget", "thinning", "model", "position", "rotation",   "transform"};
   static constexpr std::string_view of_ball[] = {
-      "name",      "formula", "size",   "spacing",  "label", "inclusions", "energy",  "material",
-      "materials", "anchors", "budget", "thinning", "model", "position",   "rotation"};
+      "name",      "formula", "size",   "spacing",  "label", "inclusions", "energy",   "material",
+      "materials", "anchors", "budget", "thinning", "model", "position",   "rotation", "transform"};
   static constexpr std::string_view any[] = {"unit",    "repair", "labels", "range",  "ranges",
                                              "largest", "size",   "label",  "layers", "inclusions"};
   static constexpr std::string_view shapes[] = {"block", "ball"};
@@ -280,9 +281,9 @@ std::optional<Energy> read_energy(const TableReader& table) {
 
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number) {
   static constexpr std::string_view all[] = {
-      "name",      "mesh",    "volume",  "formula",  "unit",   "repair", "spacing",    "labels",
-      "range",     "ranges",  "largest", "size",     "label",  "layers", "inclusions", "material",
-      "materials", "anchors", "budget",  "thinning", "energy", "model",  "position",   "rotation"};
+      "name",   "mesh",     "volume", "formula", "unit",     "repair",     "spacing",  "labels",    "range",
+      "ranges", "largest",  "size",   "label",   "layers",   "inclusions", "material", "materials", "anchors",
+      "budget", "thinning", "energy", "model",   "position", "rotation",   "transform"};
   static constexpr std::string_view sources[] = {"volume", "mesh", "formula"};
   static constexpr std::string_view models[] = {"voxels", "proxy", "auto"};
   const TableReader reader = object_table(source, table, "[[soft]]", number);

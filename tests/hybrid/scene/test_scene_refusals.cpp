@@ -82,6 +82,7 @@ const Broken broken[] = {
     {"stiffness-nan", "3:1", "is nan", "above 0"},
     {"position-infinite", "9:3", "is inf", "length in mm"},
     {"position-two-numbers", "7:1", "2 numbers", "give three"},
+    {"transform-and-position", "8:1", "both say where", "keep one"},
     {"lattice-too-large", "6:1", "2e+15 bytes", "spacing larger"},
     {"layers-too-thick", "9:5", "11 mm", "thinner"},
     {"inclusion-outside", "7:33", "outside", "move it inside"},
