@@ -55,7 +55,7 @@ struct ObjectModels {
 };
 
 struct ModelsInScene {
-  std::vector<ObjectModels> objects{};
+  std::vector<ObjectModels> objects{};   // soft ones first
   std::vector<TunableObject> tunable{};  // soft objects, to which ModelRow::setting refers
   std::vector<std::string> untouched{};  // objects that the path does not touch
   std::optional<Truth> truth{};          // empty: nothing soft is touched, and the scene as given is exact

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "hybrid/base/table.h"
 #include "hybrid/feel/just_noticeable.h"
@@ -18,12 +19,6 @@ namespace {
 // disturbs the times.
 constexpr double kClearlyCheaper = 0.9;
 constexpr const char* kByFinger = "stiffness (finger)";
-
-std::optional<double> stiffness_off(const ModelRow& row, const ObjectModels& object) {
-  const auto own = row.felt.stiffness_N_per_m, right = object.reference_felt.stiffness_N_per_m;
-  if (!own || !right || !(*right > 0.0)) return {};
-  return *own / *right - 1.0;
-}
 
 // Through a tool. The difference that only a finger feels does not count.
 bool told_through_tool(const ModelRow& row, const ObjectModels& object) {
@@ -45,11 +40,6 @@ std::string stiffness_cell(const ModelRow& row, const ObjectModels& object) {
   std::string text = fmt::format("{:.0f}", *row.felt.stiffness_N_per_m);
   if (const auto off = stiffness_off(row, object)) text += fmt::format(" ({:+.0f} %)", 100.0 * *off);
   return text;
-}
-
-std::optional<double> onset_later_ms(const ModelRow& row, const ObjectModels& object) {
-  if (!row.felt.onset_s || !object.reference_felt.onset_s) return {};
-  return 1e3 * (*row.felt.onset_s - *object.reference_felt.onset_s);
 }
 
 std::string onset_cell(const ModelRow& row, const ObjectModels& object) {
@@ -149,25 +139,6 @@ std::string reference_words_of(const ModelsInScene& models) {
       truth.words, kTruthSlower, error_of_truth(truth.spacing), error_of_truth(truth.rest));
 }
 
-std::string legend(const ModelsInScene& models) {
-  std::string text = reference_words_of(models);
-  text += fmt::format(
-      "force: of the coupling, in the ticks in which the object is touched; 1 JND = max({:.0f} % of the "
-      "reference, {:.2f} N)\n"
-      "stiffness: slope of the force over the depth of the tool in the undeformed object, while it first "
-      "goes deeper\n"
-      "told apart by: force, if p99 is above 1 JND; direction, above {} degrees; stiffness, off by more than "
-      "{:.0f} % (with\n  a finger on the surface: {:.0f} %)\n"
-      "ticks: median of three sessions in alternating order, over the whole path, not pinned to a core; "
-      "compare ratios\n",
-      100.0 * kJndShare, models.floor_N, kDirectionJnd_deg, 100.0 * kStiffnessJndTool,
-      100.0 * kStiffnessJndFinger);
-  if (!models.untouched.empty())
-    text += fmt::format("not touched by the tool, so not varied: {}\n", joined(models.untouched, ""));
-  for (const std::string& note : models.notes) text += "note: " + note + "\n";
-  return text;
-}
-
 std::string figures_of(const ModelRow& row, const ObjectModels& object) {
   std::string text = fmt::format("{:.2f} JND (p99)", row.felt.error.worst_jnd());
   if (const auto off = stiffness_off(row, object)) text += fmt::format(", stiffness {:+.0f} %", 100.0 * *off);
@@ -222,6 +193,36 @@ const ModelRow& nearest(const ObjectModels& object) {
 
 }  // namespace
 
+std::optional<double> stiffness_off(const ModelRow& row, const ObjectModels& object) {
+  const auto own = row.felt.stiffness_N_per_m, right = object.reference_felt.stiffness_N_per_m;
+  if (!own || !right || !(*right > 0.0)) return {};
+  return *own / *right - 1.0;
+}
+
+std::optional<double> onset_later_ms(const ModelRow& row, const ObjectModels& object) {
+  if (!row.felt.onset_s || !object.reference_felt.onset_s) return {};
+  return 1e3 * (*row.felt.onset_s - *object.reference_felt.onset_s);
+}
+
+std::string models_legend(const ModelsInScene& models) {
+  std::string text = reference_words_of(models);
+  text += fmt::format(
+      "force: of the coupling, in the ticks in which the object is touched; 1 JND = max({:.0f} % of the "
+      "reference, {:.2f} N)\n"
+      "stiffness: slope of the force over the depth of the tool in the undeformed object, while it first "
+      "goes deeper\n"
+      "told apart by: force, if p99 is above 1 JND; direction, above {} degrees; stiffness, off by more than "
+      "{:.0f} % (with\n  a finger on the surface: {:.0f} %)\n"
+      "ticks: median of three sessions in alternating order, over the whole path, not pinned to a core; "
+      "compare ratios\n",
+      100.0 * kJndShare, models.floor_N, kDirectionJnd_deg, 100.0 * kStiffnessJndTool,
+      100.0 * kStiffnessJndFinger);
+  if (!models.untouched.empty())
+    text += fmt::format("not touched by the tool, so not varied: {}\n", joined(models.untouched, ""));
+  for (const std::string& note : models.notes) text += "note: " + note + "\n";
+  return text;
+}
+
 std::vector<std::string> told_apart_by(const ModelRow& row, const ObjectModels& object) {
   std::vector<std::string> by;
   if (row.felt.error.worst_jnd() > 1.0) by.emplace_back("force");
@@ -236,13 +237,21 @@ std::vector<std::string> told_apart_by(const ModelRow& row, const ObjectModels& 
 }
 
 std::optional<std::size_t> cheapest_untold(const ObjectModels& object) {
-  std::optional<std::size_t> best;
+  std::vector<std::size_t> untold;
+  double least_us = std::numeric_limits<double>::infinity();
   for (std::size_t n = 0; n < object.rows.size(); ++n) {
     const ModelRow& row = object.rows[n];
     if (!row.left_out.empty() || !row.faults.empty() || told_through_tool(row, object)) continue;
     if (row.coupling_N_per_m && !object.alone) continue;  // it would change the other objects, too
-    const double factor = best == std::size_t{0} ? kClearlyCheaper : 1.0;
-    if (!best || row.tick_us.p999 < factor * object.rows[*best].tick_us.p999) best = n;
+    untold.push_back(n);
+    least_us = std::min(least_us, row.tick_us.p999);
+  }
+  std::optional<std::size_t> best;
+  for (const std::size_t n : untold) {
+    const ModelRow& row = object.rows[n];
+    if (kClearlyCheaper * row.tick_us.p999 > least_us) continue;
+    if (n == 0) return n;
+    if (!best || row.felt.error.worst_jnd() < object.rows[*best].felt.error.worst_jnd()) best = n;
   }
   return best;
 }
@@ -270,7 +279,7 @@ std::string models_verdict(const ModelsInScene& models, const ObjectModels& obje
 std::string models_words(const ModelsInScene& models) {
   std::string text;
   for (const ObjectModels& object : models.objects) text += object_words(models, object);
-  return text + legend(models);
+  return text + models_legend(models);
 }
 
 }  // namespace hybrid

@@ -16,14 +16,21 @@ namespace hybrid {
 // none.
 std::vector<std::string> told_apart_by(const ModelRow& row, const ObjectModels& object);
 
-// Index of the row with the least p99.9 of the tick among those that a hand with a tool cannot tell from the
-// reference. The scene as given is kept if no other is clearly cheaper. Empty: a hand tells all.
+// The cheapest of the rows that a hand with a tool cannot tell from the reference, by the p99.9 of the tick.
+// Rows whose times are too near to the least one to tell count as equally cheap. Of these the scene as given
+// is taken, else the most accurate one. Empty: a hand tells all.
 std::optional<std::size_t> cheapest_untold(const ObjectModels& object);
 
 // The result for one object in a few sentences, the most important one first.
 std::string models_verdict(const ModelsInScene& models, const ObjectModels& object);
 
 std::string models_words(const ModelsInScene& models);
+// The reference and its own error; the meaning of the figures; notes. One sentence or so a line.
+std::string models_legend(const ModelsInScene& models);
+// How far the model's stiffness is off that of the reference, as a share; empty if either has none.
+std::optional<double> stiffness_off(const ModelRow& row, const ObjectModels& object);
+// How much later than the reference the model is felt (ms); empty if either is not felt.
+std::optional<double> onset_later_ms(const ModelRow& row, const ObjectModels& object);
 nlohmann::ordered_json models_json(const ModelsInScene& models);
 // For each object: forces and differences from the reference over time, and force over depth.
 Figure models_figure(const ModelsInScene& models, const std::string& title);

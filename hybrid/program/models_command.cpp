@@ -11,7 +11,9 @@
 #include "hybrid/models/models_text.h"
 #include "hybrid/models/variants.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/models_page.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/report_page.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {
@@ -51,6 +53,7 @@ int compare_models_in_scene(const CompareCommand& command) {
   const Scene scene = read_scene(command.scenes.front());
   Outputs outputs;
   outputs.ask_plot(command.plot);
+  ask_report(outputs, command.report);
   outputs.ask_json(command.json);
   const ModelsInScene models = models_in_scene(
       scene, {.object = command.object, .cache = command.cache, .progress = progress_on_terminal()});
@@ -59,9 +62,13 @@ int compare_models_in_scene(const CompareCommand& command) {
   report["scene"] = scene.file.string();
   report.update(models_json(models));
   outputs.write_json(command.json, report);
-  const std::string title = scene.title.empty() ? scene.file.stem().string() : scene.title;
-  outputs.write("plot", command.plot, [&](const std::filesystem::path& file) {
-    save_svg(file, models_figure(models, title + ": models of its objects"));
+  const std::string title =
+      (scene.title.empty() ? scene.file.stem().string() : scene.title) + ": models of its objects";
+  outputs.write("plot", command.plot,
+                [&](const std::filesystem::path& file) { save_svg(file, models_figure(models, title)); });
+  outputs.attempt([&] {
+    if (!command.report.folder.empty())
+      write_report(outputs, command.report, models_in_scene_page(models, title), report);
   });
   if (command.write_variants) write_variants(scene, models, outputs);
   fmt::print(outputs.words(),
