@@ -106,7 +106,6 @@ class ModelsRun {
       : options_(options), scene_(as_read), progress_(options.progress), step_(progress_.as_step()) {
     result_.floor_N = jnd_floor_N(as_read);
     result_.dt_s = 1.0 / as_read.rate_hz;
-    result_.unit_m = as_read.unit_m;
     result_.stiffness_N_per_m = as_read.tool.stiffness_N_per_m;
     objects_ = tunable_objects(scene_);
     const Scene own = as_given(scene_, objects_, {}).scene;
@@ -121,7 +120,7 @@ class ModelsRun {
     // Soft objects first: there the models differ most.
     std::ranges::stable_sort(compared, {}, [&](const GivenObject& o) { return soft_index(o.name) ? 0 : 1; });
     plan(compared.size());
-    find_reference(as_read_touches_soft());
+    find_reference(touches_soft());
     for (const GivenObject& object : compared) result_.objects.push_back(compare(object));
     result_.tunable = objects_;
     return std::move(result_);
@@ -137,7 +136,7 @@ class ModelsRun {
     }
     return {};
   }
-  [[nodiscard]] bool as_read_touches_soft() const {
+  [[nodiscard]] bool touches_soft() const {
     return std::ranges::any_of(objects_, [&](const TunableObject& o) { return touched(o.own.object); });
   }
 
@@ -190,7 +189,7 @@ class ModelsRun {
   void plan(std::size_t compared) {
     constexpr double kUsualRows = 7.0;  // of an object
     progress_.plan(static_cast<double>(compared) * kUsualRows * static_cast<double>(kPasses));
-    if (!as_read_touches_soft()) return;
+    if (!touches_soft()) return;
     truth_scale_ = first_truth_scale(scene_, objects_, result_.notes);
     progress_.plan(truth_weight(truth_scale_));
   }

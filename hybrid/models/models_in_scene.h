@@ -60,7 +60,8 @@ struct ModelsInScene {
   std::vector<std::string> untouched{};  // objects that the path does not touch
   std::optional<Truth> truth{};          // empty: nothing soft is touched, and the scene as given is exact
   std::vector<std::string> notes{};
-  double floor_N = 0.04, dt_s = 1e-3, unit_m = 1e-3, stiffness_N_per_m = 0.0;
+  double floor_N = 0.04, dt_s = 1e-3;
+  double stiffness_N_per_m = 0.0;  // of the tool's coupling, as given
 };
 
 // `as_read`: from read_scene(). Throws SceneError. Throws std::runtime_error: the path touches nothing, or

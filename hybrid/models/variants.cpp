@@ -21,7 +21,7 @@ constexpr std::array kCoarser{1.5, 2.0};  // factors on the spacing
 constexpr double kVoxelsPerRadius = 2.0;  // of the tool's radius
 constexpr double kMostVoxelsAlong = 80.0;
 constexpr double kFewestVoxelsAcross = 2.0;
-constexpr const char* kHardMaterial = "as voxels: hard";  // no name that a scene can have: it has a colon
+constexpr const char* kHardMaterial = "as voxels: hard";  // unlike the names that people give
 
 Setting changed(const std::vector<TunableObject>& objects, std::size_t index, const ObjectSetting& one) {
   Setting setting = own_setting(objects);
