@@ -127,6 +127,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"page", {"plot"}},
         {"compare", {"session", "view"}},
         {"tune", {"compare", "plot"}},
+        {"models", {"tune"}},
         {"compose", {"session", "view"}},
         {"window", {"view"}},
         {"stress", {"session", "view"}},
@@ -134,7 +135,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
         {"validate", {"page", "compare"}},
-        {"program", {"bench", "bench/reports", "stability", "tune", "validate", "window"}}}},
+        {"program", {"bench", "bench/reports", "stability", "models", "validate", "window"}}}},
       {"interface", {{"", {}}, {"examples", {}}}},
   };
   return kRooms;

@@ -71,12 +71,16 @@ struct CompareCommand {
   std::string object;                         // empty: the first suitable object
   MeasuredOptions measured;                   // empty file: no measurement
   std::filesystem::path plot;
-  bool classic = false;  // the plot also has the thesis's algorithm
+  bool classic = false;         // the plot also has the thesis's algorithm
+  bool models = false;          // one scene, whole: its objects by other models
+  bool write_variants = false;  // of `models`: as scenes, beside the given one
+  std::filesystem::path cache;  // of `models`; empty: nothing is kept
   ReportRequest report;
   std::string json;
 };
 int compare(const CompareCommand& command);
-int compare_whole_scenes(const CompareCommand& command);  // with two or more scenes
+int compare_whole_scenes(const CompareCommand& command);     // with two or more scenes
+int compare_models_in_scene(const CompareCommand& command);  // with `models`
 
 struct TuneCommand {
   std::filesystem::path scene;

@@ -139,6 +139,7 @@ int compare_with_measured(const CompareCommand& command, const Scene& scene, Out
 
 int compare(const CompareCommand& command) {
   if (command.scenes.size() > 1) return compare_whole_scenes(command);
+  if (command.models) return compare_models_in_scene(command);
   const Scene scene = load_scene(command.scenes.front());
   Outputs outputs;
   outputs.ask_plot(command.plot);
@@ -149,7 +150,7 @@ int compare(const CompareCommand& command) {
   end_progress();
   const std::string about = fmt::format(
       "\"{}\" alone along the path of {}: no other objects, an ideal device, tissue relaxed in the tick (the "
-      "force of the whole scene: hybrid run)",
+      "models in the whole scene: --models)",
       comparison.object, scene.file.filename().string());
   write_files(command, scene, comparison, comparison_report(scene, comparison), about + ".", outputs);
   std::FILE* words = outputs.words();

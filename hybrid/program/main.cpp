@@ -12,6 +12,7 @@
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/file_ending.h"
+#include "hybrid/program/command_options.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/did_you_mean.h"
 #include "hybrid/program/outputs.h"
@@ -31,21 +32,9 @@ constexpr const char* kAbout =
     "A scene is one small text file; scenes/README.md has its keys. Packages: /usr/share/hybrid/scenes.\n"
     "Exit status: 0 done, 1 input refused (with the place and the remedy), 2 wrong usage, 130 Ctrl-C.";
 
-// The command line as it was typed. main() sets it once.
-std::string& typed_command() {
-  static std::string line;
-  return line;
-}
-
 void add_device(CLI::App& sub, std::string& device) {
   sub.add_option("--device", device, "use this one in place of the scene's")
       ->check(CLI::IsMember({"phantom", "premium-1.5", "touch", "ideal"}));
-}
-
-void add_report(CLI::App& sub, hybrid::ReportRequest& report) {
-  sub.add_option("--report", report.folder,
-                 "write report.html, a page that explains itself, and its data into this folder");
-  report.command = typed_command();
 }
 
 void add_run(CLI::App& app, int& status) {
@@ -81,7 +70,7 @@ void add_run(CLI::App& app, int& status) {
                   "write all surfaces as they are at the end: STL, OBJ (mm), PLY, GLB (m)");
   sub->add_option("--save-volume", c->save_volume,
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
-  add_report(*sub, c->report);
+  hybrid::add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, samples, reference, &status] {
     if (samples->count() > 0 && c->samples > 0 && c->realtime)
@@ -168,61 +157,11 @@ void add_devices(CLI::App& app, int& status) {
   sub->callback([c, &status] { status = hybrid::devices(*c); });
 }
 
-void add_compare(CLI::App& app, int& status) {
-  auto* sub = app.add_subcommand("compare",
-                                 "One object as mesh and proxy, as voxels, and in closed form, along the "
-                                 "same path; or two or more whole "
-                                 "scenes along the path of the first");
-  auto c = std::make_shared<hybrid::CompareCommand>();
-  sub->add_option("SCENE", c->scenes, "scene files (.toml)")->required();
-  auto* object =
-      sub->add_option("--object", c->object, "of one scene: name of the object; default: the first");
-  auto* samples =
-      sub->add_option(
-             "--samples", c->samples,
-             "of two or more scenes: most ticks in which each is compared with itself played slowly, "
-             "which takes several times as long as the session; 0: none; default: all")
-          ->check(CLI::Range(0, 1'000'000));
-  device::MeasuredFile& file = c->measured.measured;
-  auto* measured = sub->add_option(
-      "--measured", file.file, "compare the whole scene with forces measured along a motion (.traj, .csv)");
-  sub->add_option("--along", c->measured.along,
-                  "of --measured: the device's positions, from a file of their own")
-      ->needs(measured);
-  sub->add_option("--columns", file.columns,
-                  "of --measured: its columns, as in t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N")
-      ->needs(measured);
-  sub->add_option("--force", file.force,
-                  "of --measured: which force, by the first part of its columns' names")
-      ->needs(measured);
-  sub->add_option("--rate", file.rate_hz, "of --measured: samples a second, where it has no times")
-      ->check(CLI::PositiveNumber)
-      ->needs(measured);
-  sub->add_flag("--on-object", file.on_object, "of --measured: its forces are those on the object")
-      ->needs(measured);
-  auto* plot = sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
-  auto* classic = sub->add_flag("--classic", c->classic,
-                                "of --plot, one scene: draw the thesis's algorithm too, below the others")
-                      ->needs(plot);
-  measured->excludes(object)->excludes(classic);
-  add_report(*sub, c->report);
-  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([=, &status] {
-    const bool whole = c->scenes.size() > 1;
-    for (const CLI::Option* option : {object, measured, classic}) {
-      if (whole && option->count() > 0)
-        throw CLI::ValidationError(option->get_name(), "takes one scene only");
-    }
-    if (!whole && samples->count() > 0) throw CLI::ValidationError("--samples", "takes two or more scenes");
-    status = hybrid::compare(*c);
-  });
-}
-
 void add_tune(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand(
       "tune", "Chooses spacing, energy and model: the cheapest whose force no hand can tell from the truth");
   auto c = std::make_shared<hybrid::TuneCommand>();
-  c->command_line = typed_command();
+  c->command_line = hybrid::typed_command();
   sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
   sub->add_option("--budget-us", c->budget_us,
                   "most microseconds of a tick's p99.9; default: half of the device's period")
@@ -350,7 +289,7 @@ void add_stability(CLI::App& app, int& status) {
   e->table = false;
   sub->add_option("SCENE", c->scene, "scene file (.toml), such as scenes/wall.toml")->required();
   auto* plot = sub->add_option("--plot", c->plot, "stiffness over damping and rate as SVG (rigid scenes)");
-  add_report(*sub, c->report);
+  hybrid::add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->add_flag("--extremes", e->table,
                 "instead: rigid, soft and mixed scenes with every setting taken to its end")
@@ -378,7 +317,7 @@ void add_validate(CLI::App& app, int& status) {
       "validate", "The program's forces against closed forms, finite elements and measured tissue");
   auto c = std::make_shared<hybrid::ValidateCommand>();
   sub->add_flag("--quick", c->quick, "coarser grids, without the cases that take minutes");
-  add_report(*sub, c->report);
+  hybrid::add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::validate(*c); });
 }
@@ -416,13 +355,13 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   hybrid::add_pages(app, HYBRID_VERSION);
   int status = 0;
-  typed_command() = hybrid::command_line(argc, argv);
+  hybrid::typed_command() = hybrid::command_line(argc, argv);
   add_run(app, status);
   add_replay(app, status);
   add_check(app, status);
   add_compose(app, status);
   add_devices(app, status);
-  add_compare(app, status);
+  hybrid::add_compare(app, status);
   add_tune(app, status);
   add_bench(app, status);
   add_stability(app, status);

@@ -16,12 +16,12 @@ namespace hybrid {
 inline constexpr std::string_view kReasonMark = "# hybrid tune: ";
 
 // Returns the text of a scene file with the setting in it. A comment above each object that changed gives
-// `reason`, which is one sentence. Values that do not differ from the scene's keep their text. The result has
-// been parsed again: it has the values of the setting, and all other values are as before. `file` is used
-// only in messages. Throws SceneError: the text is no scene. Throws std::runtime_error with the lines to
-// write by hand: the text cannot be edited.
+// `reason`, which is one sentence, behind `mark`. Values that do not differ from the scene's keep their text.
+// The result has been parsed again: it has the values of the setting, and all other values are as before.
+// `file` is used only in messages. Throws SceneError: the text is no scene. Throws std::runtime_error with
+// the lines to write by hand: the text cannot be edited.
 std::string edited_scene(std::string_view text, const std::filesystem::path& file,
                          const std::vector<TunableObject>& objects, const Setting& setting,
-                         const std::string& reason);
+                         const std::string& reason, std::string_view mark = kReasonMark);
 
 }  // namespace hybrid

@@ -20,7 +20,8 @@ constexpr double kSpacingOrder = 1.0;
 constexpr double kRestOrder = 0.5;
 // Ratio of spacings. A smaller ratio would amplify the noise that the grid's position causes.
 constexpr double kCoarser = 2.0;
-constexpr double kSlowPlays = 0.4;  // assumed share of a path in contact, for the weight of a slow run
+constexpr double kMostTruthVoxels = 4e6;  // the truth is made coarser than kTruthScale if it had more
+constexpr double kSlowPlays = 0.4;        // assumed share of a path in contact, for the weight of a slow run
 // Exponent of 1/scale; less than 3, because mainly the voxels near the contact cost time.
 constexpr double kWeightPower = 1.5;
 
@@ -85,6 +86,26 @@ double play_weight(double scale) {
 
 double slow_weight(double scale, int slower) {
   return play_weight(scale) * (1.0 + kSlowPlays * slower);
+}
+
+double truth_weight(double scale) {
+  return slow_weight(scale, kTruthSlower) + slow_weight(scale, kTruthSlower / 2) +
+         slow_weight(kCoarser * scale, kTruthSlower);
+}
+
+double first_truth_scale(const Scene& as_read, const std::vector<TunableObject>& objects,
+                         std::vector<std::string>& notes) {
+  const BuiltScene built = build_scene(as_reference(as_read, own_setting(objects)));
+  double voxels = 0.0;
+  for (const auto& object : built.state->soft) voxels += static_cast<double>(object->lattice().voxel_count());
+  const double scale = std::max(kTruthScale, std::cbrt(voxels / kMostTruthVoxels));
+  if (scale > kTruthScale) {
+    notes.push_back(
+        fmt::format("the truth has {:.2f} of the own spacing, not {:.2f}: it would have more than {:.0f} "
+                    "million voxels",
+                    scale, kTruthScale, 1e-6 * kMostTruthVoxels));
+  }
+  return scale;
 }
 
 double Truth::error_jnd() const {

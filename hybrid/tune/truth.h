@@ -59,6 +59,13 @@ ForceCourse slow_course(const TruthPlan& plan, const Setting& setting, const Mot
 Truth measure_truth(const TruthPlan& plan, const Motion& motion, const EvaluationCache& cache,
                     const Step& step);
 
+// Scale of the truth's spacing to begin with: kTruthScale, or more if there would be too many voxels, which
+// adds a note.
+double first_truth_scale(const Scene& as_read, const std::vector<TunableObject>& objects,
+                         std::vector<std::string>& notes);
+// Expected cost of measure_truth() that begins at this scale (1: a session at the scene's own spacing).
+double truth_weight(double scale);
+
 // Relative cost of a session whose spacing is `scale` times the scene's own. slow_weight(): that of a slow
 // run.
 double play_weight(double scale);

@@ -23,9 +23,8 @@ constexpr double kFirstShare = 1.0 / 3.0;  // share of the contact that the firs
 constexpr double kMarginOfPart = 0.3, kMarginOfWhole = 0.1;
 // Timed sessions of each setting; odd, so that a median is one of them.
 constexpr std::size_t kPasses = 5, kQuickPasses = 3;
-constexpr double kMostTruthVoxels = 4e6;  // the truth is made coarser than kTruthScale if it had more voxels
-constexpr double kOtherWay = 0.5;         // spacings by which the confirming motion is moved sideways
-constexpr double kStaysInContact = 0.5;   // share of the contact that the confirming motion must keep
+constexpr double kOtherWay = 0.5;        // spacings by which the confirming motion is moved sideways
+constexpr double kStaysInContact = 0.5;  // share of the contact that the confirming motion must keep
 
 // A setting under test, with the times of its ticks in each pass.
 struct Trial {
@@ -87,8 +86,7 @@ class Search {
   void plan(const std::vector<Setting>& settings) {
     const double scale = truth_scale();
     // Runs for the truth, for the truth of the confirming motion, and two for the truth's error.
-    progress_.plan((1.0 + 1.0 / kOtherSpeed) * slow_weight(scale, kTruthSlower) +
-                   slow_weight(scale, kTruthSlower / 2) + slow_weight(2.0 * scale, kTruthSlower));
+    progress_.plan(truth_weight(scale) + slow_weight(scale, kTruthSlower) / kOtherSpeed);
     for (const Setting& setting : settings)
       progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
   }
@@ -96,17 +94,7 @@ class Search {
   // Scale of the truth's spacing. It is greater than kTruthScale if there would be too many voxels.
   double truth_scale() {
     if (truth_scale_ > 0.0) return truth_scale_;
-    const BuiltScene built = build_scene(as_reference(as_read_, own_setting(result_.objects)));
-    double voxels = 0.0;
-    for (const auto& object : built.state->soft)
-      voxels += static_cast<double>(object->lattice().voxel_count());
-    truth_scale_ = std::max(kTruthScale, std::cbrt(voxels / kMostTruthVoxels));
-    if (truth_scale_ > kTruthScale) {
-      result_.notes.push_back(
-          fmt::format("the truth has {:.2f} of the own spacing, not {:.2f}: it would have more than {:.0f} "
-                      "million voxels",
-                      truth_scale_, kTruthScale, 1e-6 * kMostTruthVoxels));
-    }
+    truth_scale_ = first_truth_scale(as_read_, result_.objects, result_.notes);
     return truth_scale_;
   }
 

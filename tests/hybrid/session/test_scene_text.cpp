@@ -78,23 +78,30 @@ TEST_F(SceneText, AKeyThatTheSceneLacksIsAdded) {
 // A value that has no place of its own in the text is not written, and the reason is reported.
 TEST_F(SceneText, WhatHasNoPlaceIsLeft) {
   const std::string text =
-      "format = 1\ntool = { radius = 2 }\nrigid = [{ name = \"a\", primitive = \"ball\", radius = 4, "
-      "friction = { static "
-      "= 0.4 } }]\n" +
+      "format = 1\ntool.radius = 2\nrigid = [{ name = \"a\", primitive = \"ball\", radius = 4, "
+      "friction = { static = 0.4 } }]\n" +
       kPath;
   const auto edited = written(text, {{"", coupling_stiffness, 500.0, 1000.0},
                                      {"a", static_friction, 0.6, 0.4},
                                      {"a", dynamic_friction, 0.4, 0.4},
-                                     {"a", damping, 1.0, 0.0},
                                      {"gone", damping, 1.0, 0.0},
                                      {"block", tissue_factor, 2.0, 1.0}});
   EXPECT_EQ(edited.text, text);
-  ASSERT_EQ(edited.left.size(), 5U);
-  EXPECT_EQ(edited.left[0], "tool: stiffness (its table is written within a line)");
+  ASSERT_EQ(edited.left.size(), 4U);
+  EXPECT_EQ(edited.left[0], "tool: stiffness (its place in the text was not found)");
   EXPECT_EQ(edited.left[1], "a: static-friction (it is written as a table)");
-  EXPECT_EQ(edited.left[2], "a: damping (its table is written within a line)");
-  EXPECT_EQ(edited.left[3], "gone: damping (its table is not in the scene's text)");
-  EXPECT_NE(edited.left[4].find("may share a material"), std::string::npos);
+  EXPECT_EQ(edited.left[2], "gone: damping (its table is not in the scene's text)");
+  EXPECT_NE(edited.left[3].find("may share a material"), std::string::npos);
+}
+
+// A key that a table within a line lacks is added behind a value of the table.
+TEST_F(SceneText, AKeyIsAddedWithinALine) {
+  const std::string text =
+      "format = 1\ntool = { radius = 2 } # one\nrigid = [{ primitive = \"ball\", name = \"a\" }, # two\n]\n";
+  const auto edited = written(text, {{"", coupling_stiffness, 500.0, 1000.0}, {"a", damping, 1.0, 0.0}});
+  EXPECT_EQ(edited.text,
+            "format = 1\ntool = { radius = 2, stiffness = 500 } # one\n"
+            "rigid = [{ primitive = \"ball\", name = \"a\", damping = 1 }, # two\n]\n");
 }
 
 // Values in tables that are written on one line change too.

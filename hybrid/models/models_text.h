@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The result of models_in_scene() in words, as JSON, and as a figure.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "hybrid/models/models_in_scene.h"
+#include "hybrid/plot/svg_figure.h"
+
+namespace hybrid {
+
+// By which of its figures a hand tells the model from the reference, in words: "force", "direction",
+// "stiffness" (more than kStiffnessJndTool), "stiffness (finger)" (more than kStiffnessJndFinger). Empty: by
+// none.
+std::vector<std::string> told_apart_by(const ModelRow& row, const ObjectModels& object);
+
+// The cheapest of the rows that a hand with a tool cannot tell from the reference, by the p99.9 of the tick.
+// Rows whose times are too near to the least one to tell count as equally cheap. Of these the scene as given
+// is taken, else the most accurate one. Empty: a hand tells all.
+std::optional<std::size_t> cheapest_untold(const ObjectModels& object);
+
+// The result for one object in a few sentences, the most important one first.
+std::string models_verdict(const ModelsInScene& models, const ObjectModels& object);
+
+std::string models_words(const ModelsInScene& models);
+// The reference and its own error; the meaning of the figures; notes. One sentence or so a line.
+std::string models_legend(const ModelsInScene& models);
+// How far the model's stiffness is off that of the reference, as a share; empty if either has none.
+std::optional<double> stiffness_off(const ModelRow& row, const ObjectModels& object);
+// How much later than the reference the model is felt (ms); empty if either is not felt.
+std::optional<double> onset_later_ms(const ModelRow& row, const ObjectModels& object);
+nlohmann::ordered_json models_json(const ModelsInScene& models);
+// For each object: forces and differences from the reference over time, and force over depth.
+Figure models_figure(const ModelsInScene& models, const std::string& title);
+
+}  // namespace hybrid

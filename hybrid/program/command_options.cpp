@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/program/command_options.h"
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+namespace hybrid {
+
+std::string& typed_command() {
+  static std::string line;
+  return line;
+}
+
+void add_report(CLI::App& sub, ReportRequest& report) {
+  sub.add_option("--report", report.folder,
+                 "write report.html, a page that explains itself, and its data into this folder");
+  report.command = typed_command();
+}
+
+void add_compare(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand("compare",
+                                 "One object as mesh and proxy, as voxels, and in closed form, along the "
+                                 "same path; or two or more whole "
+                                 "scenes along the path of the first");
+  auto c = std::make_shared<CompareCommand>();
+  sub->add_option("SCENE", c->scenes, "scene files (.toml)")->required();
+  auto* object =
+      sub->add_option("--object", c->object, "of one scene: name of the object; default: the first");
+  auto* samples =
+      sub->add_option(
+             "--samples", c->samples,
+             "of two or more scenes: most ticks in which each is compared with itself played slowly, "
+             "which takes several times as long as the session; 0: none; default: all")
+          ->check(CLI::Range(0, 1'000'000));
+  device::MeasuredFile& file = c->measured.measured;
+  auto* measured = sub->add_option(
+      "--measured", file.file, "compare the whole scene with forces measured along a motion (.traj, .csv)");
+  sub->add_option("--along", c->measured.along,
+                  "of --measured: the device's positions, from a file of their own")
+      ->needs(measured);
+  sub->add_option("--columns", file.columns,
+                  "of --measured: its columns, as in t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N")
+      ->needs(measured);
+  sub->add_option("--force", file.force,
+                  "of --measured: which force, by the first part of its columns' names")
+      ->needs(measured);
+  sub->add_option("--rate", file.rate_hz, "of --measured: samples a second, where it has no times")
+      ->check(CLI::PositiveNumber)
+      ->needs(measured);
+  sub->add_flag("--on-object", file.on_object, "of --measured: its forces are those on the object")
+      ->needs(measured);
+  auto* plot = sub->add_option("--plot", c->plot, "write force over time and depth as SVG");
+  auto* classic = sub->add_flag("--classic", c->classic,
+                                "of --plot, one scene: draw the thesis's algorithm too, below the others")
+                      ->needs(plot);
+  auto* models = sub->add_flag("--models", c->models,
+                               "of one scene: play it whole, each object that the path touches by other "
+                               "models, against one reference; some minutes");
+  sub->add_option("--cache", c->cache, "of --models: folder that keeps the reference; as in tune")
+      ->needs(models);
+  sub->add_flag("--write-variants", c->write_variants,
+                "of --models: write each model as a scene beside the given one, comments kept")
+      ->needs(models);
+  measured->excludes(object)->excludes(classic)->excludes(models);
+  models->excludes(classic);
+  add_report(*sub, c->report);
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([=, &status] {
+    const bool whole = c->scenes.size() > 1;
+    for (const CLI::Option* option : {object, measured, classic, models}) {
+      if (whole && option->count() > 0)
+        throw CLI::ValidationError(option->get_name(), "takes one scene only");
+    }
+    if (!whole && samples->count() > 0) throw CLI::ValidationError("--samples", "takes two or more scenes");
+    status = compare(*c);
+  });
+}
+
+}  // namespace hybrid

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Options that are spelled outside main.cpp.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <string>
+
+#include "hybrid/program/commands.h"
+
+namespace hybrid {
+
+// The command line as it was typed. main() sets it once, before the options are added.
+std::string& typed_command();
+
+// The option --report.
+void add_report(CLI::App& sub, ReportRequest& report);
+
+// The command `compare`. It writes its exit status into `status` when it runs.
+void add_compare(CLI::App& app, int& status);
+
+}  // namespace hybrid
