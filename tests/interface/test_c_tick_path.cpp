@@ -6,8 +6,6 @@
 #include <cstdlib>
 #include <thread>
 
-#include "hybrid/base/flush_to_zero.h"
-#include "hybrid/session/session.h"
 #include "tests/hybrid/fixtures/counted_calls.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/interface/c_session.h"
@@ -17,7 +15,6 @@ namespace {
 using tests::calls;
 using tests::Calls;
 using tests::CSession;
-using tests::expect_ok;
 using tests::line;
 using tests::watched;
 
