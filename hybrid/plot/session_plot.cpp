@@ -167,10 +167,9 @@ Panel clearance_panel(const ClearanceCourse& near) {
       if (g < deepest) deepest = g;
     }
     if (std::ranges::none_of(gap_mm, [](double g) { return std::isfinite(g); })) return;
+    const std::string percent = with_decimals(std::abs(100.0 * deepest / near.cell_m), 2);
     const std::string overlap =
-        deepest < 0.0
-            ? ", overlap at most " + with_decimals(-100.0 * deepest / near.cell_m, 2) + " % of a voxel"
-            : ", no overlap";
+        percent != with_decimals(0.0, 2) ? ", overlap at most " + percent + " % of a voxel" : ", no overlap";
     panel.series.push_back({name + overlap, near.t_s, std::move(gap_mm), series_colour(colour)});
   };
   add("tissue and rigid", near.rigid_m, 0);

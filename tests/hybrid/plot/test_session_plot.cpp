@@ -240,6 +240,22 @@ TEST(SessionPlot, SqueezesTheAirAndSaysSo) {
   EXPECT_EQ(count(session.svg(), "long times in the air"), 0U);
 }
 
+TEST(SessionPlot, SaysTheOverlapIfTwoDecimalsShowIt) {
+  const ThreeContacts session;
+  for (const auto& [gap_m, words] : {std::pair(-2e-5, "overlap at most 1.00 % of a voxel"),
+                                     {-2e-8, "no overlap"},
+                                     {0.0, "no overlap"},
+                                     {1e-4, "no overlap"}}) {
+    const hybrid::ClearanceCourse near{
+        .t_s = {0.0, 1.0}, .rigid_m = {1e-3, gap_m}, .soft_m = {nan, nan}, .cell_m = 2e-3};
+    EXPECT_EQ(
+        count(hybrid::to_svg(hybrid::session_figure(session.rows, session.objects, "a", {.near = near})),
+              words),
+        1U)
+        << gap_m;
+  }
+}
+
 TEST(SessionPlot, ShowsTickTimesBesideTheNextTick) {
   ThreeContacts session;
   const std::string svg = session.svg();
