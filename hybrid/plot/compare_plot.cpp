@@ -16,8 +16,8 @@ namespace hybrid {
 namespace {
 
 constexpr double kGapInLine = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kMostDepthPanels = 3;  // contacts with a panel of force over depth
-constexpr double kTurned_deg = 15.0;         // the panel of angles is drawn if an angle exceeds this
+constexpr std::size_t kMostContactPanels = 3;  // contacts with a panel of force over depth or path length
+constexpr double kTurned_deg = 15.0;           // the panel of angles is drawn if an angle exceeds this
 // Share of a contact's largest force; a pull beyond it is drawn with its sign.
 constexpr double kReversedShare = 0.1;
 constexpr double kShownOutside_m = 1e-3;  // force over depth begins this far outside the object
@@ -113,8 +113,8 @@ class ComparePlot {
     Panel direction = direction_panel();
     if (!direction.series.empty()) group.panels.push_back(std::move(direction));
     figure.groups.push_back(std::move(group));
-    const std::vector<Contact> drawn = most_felt(contacts_, kMostDepthPanels);
-    for (const Contact& contact : drawn) figure.groups.push_back(depth_group(contact));
+    const std::vector<Contact> drawn = most_felt(contacts_, kMostContactPanels);
+    for (const Contact& contact : drawn) figure.groups.push_back(contact_group(contact));
     if (contacts_.size() > drawn.size()) {
       figure.groups.back().panels.back().note =
           std::to_string(contacts_.size() - drawn.size()) + " contacts that were felt less are not drawn";
@@ -215,31 +215,47 @@ class ComparePlot {
     return panel;
   }
 
-  PanelGroup depth_group(const Contact& contact) const {
+  // A stroke has force over path length, except where the depth is given.
+  [[nodiscard]] bool over_path_length(const Contact& contact) const {
+    return contact.stroke && curves_.empty() && std::ranges::all_of(models_, [](const ComparedModel& model) {
+             return model.apart || model.depth_m.empty();
+           });
+  }
+
+  Series line_of(std::size_t m, const Contact& contact) const {
+    const ComparedModel& model = models_[m];
+    Series line{.name = model.name,
+                .x = {},
+                .y = {},
+                .colour = series_colour(m),
+                .width = m == options_.reference ? 2.4 : 1.6,
+                .dashed = m >= kSeriesColours};
+    const std::span<const TraceRow> rows = rows_in(model.rows, contact);
+    const auto first = static_cast<std::size_t>(rows.data() - model.rows.data());
+    const std::vector<double> path_m =
+        over_path_length(contact) ? path_length_m(rows) : std::vector<double>();
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const std::size_t i = first + r;
+      const double depth_m = i < model.depth_m.size() ? model.depth_m[i] : contact.depth_m(rows[r].device_m);
+      const double x_m = path_m.empty() ? depth_m : path_m[r];
+      line.x.push_back(x_m >= -kShownOutside_m ? x_m * 1e3 : kGapInLine);
+      line.y.push_back(shown(rows[r].t_s, rows[r].force_N));
+    }
+    return line;
+  }
+
+  PanelGroup contact_group(const Contact& contact) const {
+    const bool stroke = over_path_length(contact);
     Panel panel;
-    panel.title = "Force over depth, contact from " + with_decimals(contact.from_s, 2) + " to " +
-                  with_decimals(contact.to_s, 2) + " s";
+    panel.title = (stroke ? "Force over path length, contact from " : "Force over depth, contact from ") +
+                  with_decimals(contact.from_s, 2) + " to " + with_decimals(contact.to_s, 2) + " s";
     panel.y_label = "force (N)";
     panel.from_zero = true;
     bool known = false;
     for (std::size_t m = 0; m < models_.size(); ++m) {
-      const ComparedModel& model = models_[m];
-      if (model.apart) continue;
-      Series line{.name = model.name,
-                  .x = {},
-                  .y = {},
-                  .colour = series_colour(m),
-                  .width = m == options_.reference ? 2.4 : 1.6,
-                  .dashed = m >= kSeriesColours};
-      for (std::size_t i = 0; i < model.rows.size(); ++i) {
-        const TraceRow& row = model.rows[i];
-        if (!(row.t_s >= contact.from_s && row.t_s <= contact.to_s)) continue;
-        known = known || i < model.depth_m.size();
-        const double depth_m = i < model.depth_m.size() ? model.depth_m[i] : contact.depth_m(row.device_m);
-        line.x.push_back(depth_m >= -kShownOutside_m ? depth_m * 1e3 : kGapInLine);
-        line.y.push_back(shown(row.t_s, row.force_N));
-      }
-      panel.series.push_back(std::move(line));
+      if (models_[m].apart) continue;
+      known = known || !models_[m].depth_m.empty();
+      panel.series.push_back(line_of(m, contact));
     }
     for (const ReferenceCurve& curve : curves_) {
       std::vector<double> depth_mm = curve.depth_m;
@@ -247,7 +263,9 @@ class ComparePlot {
       panel.series.push_back({curve.name, std::move(depth_mm), curve.force_N, "#333333", 1.8, true});
     }
     PanelGroup group;
-    group.x_label = known ? "depth of the device (mm)" : "depth of the device since the first touch (mm)";
+    group.x_label = stroke  ? "path length of the device since the first touch (mm)"
+                    : known ? "depth of the device (mm)"
+                            : "depth of the device since the first touch (mm)";
     group.panels.push_back(std::move(panel));
     return group;
   }

@@ -44,9 +44,10 @@ std::string reference_note(const std::string& name, const ComparePlotOptions& op
 Area not_felt_area(const std::vector<double>& ends);
 
 // Plots force over time and its difference from the reference in JND, for each model in panels of its own.
-// For each contact plots force over depth. The difference is that of the force vectors, negative where the
-// model's force is the smaller one. Models may have their own times: they are compared at the reference's
-// times, linearly between samples. Throws std::invalid_argument if the reference is no model.
+// For each contact plots force over depth, or for a stroke along a surface over path length. The difference
+// is that of the force vectors, negative where the model's force is the smaller one. Models may have their
+// own times: they are compared at the reference's times, linearly between samples. Throws
+// std::invalid_argument if the reference is no model.
 Figure compare_figure(std::span<const ComparedModel> models, std::span<const ReferenceCurve> curves,
                       const std::string& title, const ComparePlotOptions& options = {});
 // Writes the figure as a file. Also throws std::runtime_error if the file is not writable.

@@ -12,6 +12,21 @@ constexpr double kLiftOff_s = 0.05;     // a contact continues if the tool lifte
 constexpr double kKeptShare = 0.03;     // share of the whole time that stays before and after each contact
 constexpr double kLongShare = 0.08;     // share of the whole time; shorter stretches are not squeezed
 constexpr double kLeastForce_N = 1e-9;  // a smaller force has no direction
+// A path goes on in steps of this length. Shorter movements may be noise: a PHANToM's encoders have steps of
+// 0.03 mm along each axis.
+constexpr double kPathStep_m = 1e-4;
+
+bool is_stroke(std::span<const TraceRow> rows, const Contact& contact) {
+  double along_m = 0.0, across_m = 0.0;
+  for (const TraceRow& row : rows) {
+    const double depth_m = contact.depth_m(row.device_m);
+    const double aside_m = glm::length(row.device_m - contact.start_m - depth_m * contact.into);
+    if (!std::isfinite(depth_m + aside_m)) continue;
+    along_m = std::max(along_m, std::abs(depth_m));
+    across_m = std::max(across_m, aside_m);
+  }
+  return across_m > along_m;
+}
 
 }  // namespace
 
@@ -64,6 +79,7 @@ std::vector<Contact> contacts_of(std::span<const TraceRow> rows, const Intervals
     contacts[n].most_N = force;
     contacts[n].into = -row.force_N / force;
   }
+  for (Contact& contact : contacts) contact.stroke = is_stroke(rows_in(rows, contact), contact);
   return contacts;
 }
 
@@ -72,6 +88,27 @@ std::vector<Contact> most_felt(std::vector<Contact> contacts, std::size_t most) 
   if (contacts.size() > most) contacts.resize(most);
   std::ranges::stable_sort(contacts, {}, &Contact::from_s);
   return contacts;
+}
+
+std::span<const TraceRow> rows_in(std::span<const TraceRow> rows, const Contact& contact) {
+  const auto from = std::ranges::find_if(rows, [&](const TraceRow& r) { return r.t_s >= contact.from_s; });
+  const auto to = std::find_if(from, rows.end(), [&](const TraceRow& r) { return r.t_s > contact.to_s; });
+  return {from, to};
+}
+
+std::vector<double> path_length_m(std::span<const TraceRow> rows) {
+  std::vector<double> lengths;
+  lengths.reserve(rows.size());
+  double passed_m = 0.0;  // up to the last corner
+  glm::dvec3 corner_m = rows.empty() ? glm::dvec3(0.0) : rows.front().device_m;
+  for (const TraceRow& row : rows) {
+    const double from_corner_m = glm::length(row.device_m - corner_m);
+    lengths.push_back(passed_m + (std::isfinite(from_corner_m) ? from_corner_m : 0.0));
+    if (from_corner_m < kPathStep_m) continue;
+    if (std::isfinite(from_corner_m)) passed_m += from_corner_m;
+    if (std::isfinite(glm::length(row.device_m))) corner_m = row.device_m;
+  }
+  return lengths;
 }
 
 Intervals merged(Intervals a, const Intervals& b) {

@@ -19,12 +19,14 @@ Intervals contact_intervals(std::span<const TraceRow> rows, std::uint32_t mask);
 // Sum of the intervals' lengths (s).
 double duration(const Intervals& intervals);
 
-// One press of the hand. The tool may lift off for a moment within it.
+// One press or stroke of the hand. The tool may lift off for a moment within it.
 struct Contact {
   double from_s = 0.0, to_s = 0.0;
   double most_N = 0.0;              // largest force
   glm::dvec3 start_m{0.0};          // position of the device at first touch
   glm::dvec3 into{0.0, 0.0, -1.0};  // unit vector opposite to the largest force
+  // The device moves farther across `into` than along it. Depth then says little about the place of the tool.
+  bool stroke = false;
 
   // Travel of the device since the first touch, along `into` (m).
   [[nodiscard]] double depth_m(const glm::dvec3& device_m) const;
@@ -36,6 +38,13 @@ std::vector<Contact> contacts_of(std::span<const TraceRow> rows, const Intervals
 
 // The contacts with the largest forces, at most `most` of them, in order of time.
 std::vector<Contact> most_felt(std::vector<Contact> contacts, std::size_t most);
+
+// The rows of a contact. The times of all rows ascend.
+std::span<const TraceRow> rows_in(std::span<const TraceRow> rows, const Contact& contact);
+
+// The path length of the device from the first row to each row (m). A movement back and forth of less than
+// the step of a device's encoder adds nothing.
+std::vector<double> path_length_m(std::span<const TraceRow> rows);
 
 // All intervals of both, in order; overlapping ones are merged.
 Intervals merged(Intervals a, const Intervals& b);

@@ -15,7 +15,7 @@ namespace hybrid {
 namespace {
 
 constexpr const char* kTouchedColour = "#eaf2e3";
-constexpr std::size_t kMostContacts = 6;  // lines of force over depth at most
+constexpr std::size_t kMostContacts = 6;  // greatest number of lines of presses, and of strokes
 constexpr std::size_t kLookUpEvery = 10;  // ticks between two look-ups of the material beneath the tool
 constexpr std::uint8_t kNoPart = 255;     // the material is unknown
 
@@ -167,10 +167,9 @@ Panel clearance_panel(const ClearanceCourse& near) {
       if (g < deepest) deepest = g;
     }
     if (std::ranges::none_of(gap_mm, [](double g) { return std::isfinite(g); })) return;
+    const std::string percent = with_decimals(std::abs(100.0 * deepest / near.cell_m), 2);
     const std::string overlap =
-        deepest < 0.0
-            ? ", overlap at most " + with_decimals(-100.0 * deepest / near.cell_m, 2) + " % of a voxel"
-            : ", no overlap";
+        percent != with_decimals(0.0, 2) ? ", overlap at most " + percent + " % of a voxel" : ", no overlap";
     panel.series.push_back({name + overlap, near.t_s, std::move(gap_mm), series_colour(colour)});
   };
   add("tissue and rigid", near.rigid_m, 0);
@@ -214,31 +213,42 @@ std::string name_in(const Contact& contact, std::span<const Touched> things, std
   return name;
 }
 
-// Force over depth. There is no series without contacts.
-Panel depth_panel(std::span<const TraceRow> rows, std::span<const Touched> things, const Intervals& any) {
-  Panel panel;
-  panel.title = "Force over depth, one line for each contact";
+// Force over depth for presses, over path length for strokes.
+Series course_of(const Contact& contact, std::span<const TraceRow> rows) {
+  Series line;
+  const std::span<const TraceRow> own = rows_in(rows, contact);
+  if (contact.stroke) line.x = path_length_m(own);
+  for (const TraceRow& row : own) {
+    if (!contact.stroke) line.x.push_back(contact.depth_m(row.device_m));
+    line.y.push_back(glm::length(row.force_N));
+  }
+  for (double& x : line.x) x *= 1e3;  // mm
+  line.width = 1.6;
+  return line;
+}
+
+// The presses or the strokes of a session, one line for each. There is no group without any.
+void add_courses(Figure& figure, std::span<const TraceRow> rows, std::span<const Touched> things,
+                 std::vector<Contact> contacts, bool strokes) {
+  std::erase_if(contacts, [&](const Contact& contact) { return contact.stroke != strokes; });
+  if (contacts.empty()) return;
+  const std::vector<Contact> shown = most_felt(contacts, kMostContacts);
+  PanelGroup& group = figure.groups.emplace_back();
+  group.x_label = strokes ? "path length of the device since the first touch (mm)"
+                          : "depth of the device since the first touch, against the largest force (mm)";
+  Panel& panel = group.panels.emplace_back();
+  panel.title = strokes ? "Force over path length, one line for each stroke"
+                        : "Force over depth, one line for each press";
   panel.y_label = "force (N)";
   panel.from_zero = true;
-  const std::vector<Contact> all = contacts_of(rows, any);
-  const std::vector<Contact> contacts = most_felt(all, kMostContacts);
-  for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const Contact& contact = contacts[c];
-    Series line{.name = with_decimals(contact.from_s, 2) + " s: " + name_in(contact, things, rows),
-                .x = {},
-                .y = {},
-                .colour = series_colour(c),
-                .width = 1.6};
-    for (const TraceRow& row : rows) {
-      if (!(row.t_s >= contact.from_s && row.t_s <= contact.to_s)) continue;
-      line.x.push_back(contact.depth_m(row.device_m) * 1e3);
-      line.y.push_back(glm::length(row.force_N));
-    }
+  for (std::size_t c = 0; c < shown.size(); ++c) {
+    Series line = course_of(shown[c], rows);
+    line.name = with_decimals(shown[c].from_s, 2) + " s: " + name_in(shown[c], things, rows);
+    line.colour = series_colour(c);
     panel.series.push_back(std::move(line));
   }
-  if (all.size() > contacts.size())
-    panel.note = std::to_string(all.size() - contacts.size()) + " contacts that were felt less are not drawn";
-  return panel;
+  if (contacts.size() > shown.size())
+    panel.note = std::to_string(contacts.size() - shown.size()) + " that were felt less are not drawn";
 }
 
 // Index of the material of the surface vertex nearest to a point.
@@ -331,12 +341,7 @@ Figure session_figure(std::span<const TraceRow> rows, std::span<const PlottedObj
   }
   figure.groups.push_back(std::move(group));
 
-  Panel over_depth = depth_panel(rows, things, any);
-  if (!over_depth.series.empty()) {
-    PanelGroup& by_depth = figure.groups.emplace_back();
-    by_depth.x_label = "depth of the device since the first touch, against the largest force (mm)";
-    by_depth.panels.push_back(std::move(over_depth));
-  }
+  for (const bool strokes : {false, true}) add_courses(figure, rows, things, contacts_of(rows, any), strokes);
   return figure;
 }
 

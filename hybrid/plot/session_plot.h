@@ -37,8 +37,8 @@ struct SessionPlotOptions {
 };
 
 // Plots force over time, a lane of contact for each object that was touched, the distance between device and
-// proxy, the clearance between objects, the times of the ticks, and force over depth with a line for each
-// contact. Long times without contact are squeezed.
+// proxy, the clearance between objects, and the times of the ticks. Long times without contact are squeezed.
+// Each press has a line of force over depth, and each stroke along a surface one over path length.
 Figure session_figure(std::span<const TraceRow> rows, std::span<const PlottedObject> objects,
                       const std::string& title, const SessionPlotOptions& options = {});
 // Writes the figure as a file. Throws std::runtime_error if the file is not writable.

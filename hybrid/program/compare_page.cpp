@@ -116,7 +116,7 @@ Page models_page(const Comparison& comparison, const Figure& figure, const std::
        .parts = {
            PageFigure{.name = "models",
                       .caption = "Force over time and difference from the reference, for each model; force "
-                                 "over depth, for each contact.",
+                                 "over depth for each press, over path length for each stroke.",
                       .alternative = "Forces of the models along the motion; the table has the differences",
                       .svg = to_svg(figure)}}});
   return page;

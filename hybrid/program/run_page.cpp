@@ -107,13 +107,15 @@ PageSection force_section(const DrawnScene& drawn, const SessionResult& result, 
   const auto objects = plotted_objects(drawn, result.rows, result.object_force_N);
   const Figure figure =
       session_figure(result.rows, objects, title, {.near = result.clearance, .period_s = result.dt_s});
-  return {.heading = "Force on the hand",
-          .parts = {PageFigure{.name = "force",
-                               .caption = "Force over time, contacts, depth and the time of each tick. Last, "
-                                          "force over depth, one line for each contact.",
-                               .alternative = fmt::format("Force over {:.2f} s, at most {:.2f} N",
-                                                          seconds_of(result), result.max_force_N),
-                               .svg = to_svg(figure)}}};
+  return {
+      .heading = "Force on the hand",
+      .parts = {PageFigure{.name = "force",
+                           .caption = "Force over time, contacts, distance of the proxy and the time of each "
+                                      "tick. Below, force over depth for each press, and over path length "
+                                      "for each stroke.",
+                           .alternative = fmt::format("Force over {:.2f} s, at most {:.2f} N",
+                                                      seconds_of(result), result.max_force_N),
+                           .svg = to_svg(figure)}}};
 }
 
 PageTable objects_table(const Json& report, double dt_s) {

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/session/pair_presses.h"
 #include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
@@ -152,16 +153,7 @@ void Player::snapshot(Snapshot& out) const {
 }
 
 std::vector<PairPress> Player::presses() const {
-  const auto rigid = static_cast<std::uint32_t>(built_.world->rigid.size());
-  std::vector<PairPress> out;
-  for (const PairForce& force : forces_between(*built_.world, *built_.state).pairs) {
-    PairPress press{.soft = rigid + force.pair.soft};
-    if (force.pair.kind == ObjectPair::Kind::rigid) press.other = force.pair.other;
-    if (force.pair.kind == ObjectPair::Kind::soft) press.other = rigid + force.pair.other;
-    if (force.on_soft_N) press.force_N = glm::length(*force.on_soft_N);
-    out.push_back(press);
-  }
-  return out;
+  return pair_presses(*built_.world, *built_.state);
 }
 
 Recording Player::recording(const std::string& scene_text) const {

@@ -14,6 +14,7 @@
 #include "device/simulated/simulated.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/session/equilibrium.h"
+#include "hybrid/session/pair_presses.h"
 #include "hybrid/session/relaxation_thread.h"
 #include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/tick/proxy/proxy_step.h"
@@ -140,7 +141,7 @@ class Run {
       TickResult last;
       last.device_m = state_.device_m;
       last.proxy_m = state_.proxy_m;
-      result_.moment = take_snapshot(world_, state_, last, static_cast<double>(ticks_done_) * dt_);
+      keep_moment(last, ticks_done_);
     }
     if (realtime_) {
       result_.realtime_note = served.priority;
@@ -278,7 +279,12 @@ class Run {
     const double score = moment_score(world_, state_);
     if (score <= best_score_ * 1.02) return;
     best_score_ = score;
+    keep_moment(felt, tick);
+  }
+
+  void keep_moment(const TickResult& felt, std::uint64_t tick) {
     result_.moment = take_snapshot(world_, state_, felt, static_cast<double>(tick) * dt_);
+    result_.moment->presses = pair_presses(world_, state_);
   }
 
   const Scene& scene_;

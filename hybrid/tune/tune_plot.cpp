@@ -18,7 +18,8 @@ namespace {
 constexpr double kWidth = 960.0, kHeight = 620.0;
 constexpr double kLeft = 76.0, kRight = 930.0, kTop = 70.0, kBottom = 560.0;
 constexpr double kSmallestMark = 4.0, kLargestMark = 14.0;  // radius
-constexpr double kLetterWidth = 6.0;                        // width of a letter
+constexpr double kLetterWidth = 6.8;                        // width of a letter, of the wider fonts
+constexpr double kNameApart = 13.0;                         // least distance of the base lines of two names
 constexpr int kTicks = 16;                                  // marks on an axis, at most
 constexpr double kMargin = 1.5;       // factor by which the axes exceed the outermost values
 constexpr double kLeastShown = 0.01;  // JND; a smaller error is drawn at this value
@@ -56,6 +57,10 @@ class TunePlot {
   }
 
  private:
+  struct Name {
+    double from, to, y;  // y: of the base line
+  };
+
   static bool drawn(const TunedSetting& s) { return s.whole_session && s.tick_us.p999 > 0.0; }
   static bool beaten(const TunedSetting& s) { return !s.whole() || s.dominated_by.has_value(); }
   static double error_of(const TunedSetting& s) { return std::max(s.error.worst_jnd(), kLeastShown); }
@@ -139,18 +144,29 @@ class TunePlot {
   void draw_name(const TunedSetting& s, bool chosen) {
     const std::string words = shortened(s.words + (chosen ? " (chosen)" : s.own ? " (as it is)" : ""), 60);
     const double width = kLetterWidth * static_cast<double>(letters(words));
-    const double radius = radius_of(s) + (chosen ? 4.0 : 0.0);
-    const bool left = x_of(s) + radius + 5.0 + width > kRight;
-    const double x = left ? x_of(s) - radius - 5.0 : x_of(s) + radius + 5.0;
-    const double from = left ? x - width : x;
-    const double y = y_of(s) - 3.0;
-    for (const auto& [a, b, at] : names_) {
-      if (from < b && from + width > a && std::fabs(y - at) < 13.0) return;
+    const double aside = radius_of(s) + (chosen ? 4.0 : 0.0) + 5.0;
+    // Beside the mark, then above and below its middle.
+    for (const double lower : {-3.0, -16.0, 14.0}) {
+      for (const bool left : {false, true}) {
+        const double x = left ? x_of(s) - aside : x_of(s) + aside, from = left ? x - width : x;
+        const Name name{from, from + width, y_of(s) + lower};
+        if (!has_room(name)) continue;
+        names_.push_back(name);
+        svg_.text(
+            x, name.y, words,
+            fmt::format("class=\"t h{}\" text-anchor=\"{}\"", beaten(s) ? " p" : "", left ? "end" : "start")
+                .c_str());
+        return;
+      }
     }
-    names_.push_back({from, from + width, y});
-    svg_.text(x, y, words,
-              fmt::format("class=\"t h{}\" text-anchor=\"{}\"", beaten(s) ? " p" : "", left ? "end" : "start")
-                  .c_str());
+  }
+
+  // Within the frame, and beside all other names.
+  [[nodiscard]] bool has_room(const Name& name) const {
+    return name.from > kLeft && name.to < kRight && name.y > kTop + kNameApart && name.y < kBottom &&
+           std::ranges::none_of(names_, [&](const Name& other) {
+             return name.from < other.to && name.to > other.from && std::fabs(name.y - other.y) < kNameApart;
+           });
   }
 
   [[nodiscard]] std::string whole(const std::string& title) const {
@@ -163,10 +179,6 @@ class TunePlot {
         "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{3}</svg>\n",
         fixed(kWidth), fixed(kHeight), escaped(title), svg_.body);
   }
-
-  struct Name {
-    double from, to, y;
-  };
 
   const TuneResult& result_;
   Axis x_, y_;

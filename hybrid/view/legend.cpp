@@ -21,6 +21,7 @@ constexpr std::size_t kMostSingly = 6;  // if more rigid objects are untouched, 
 // Greatest number of rows for the materials of one object.
 constexpr std::size_t kMostMaterials = palette::material.size() + 1;
 constexpr std::size_t kMostStripes = 4;  // greatest number of colours of one swatch
+constexpr std::size_t kMostPairs = 4;    // greatest number of rows for pairs of objects
 
 std::string and_more(std::size_t count) {
   return "and " + std::to_string(count) + " more";
@@ -124,6 +125,43 @@ void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Sna
   rows.push_back({.swatch = stripes(rest), .name = and_more(count - listed), .within = true});
 }
 
+// The pairs that press on each other: the largest forces first, after those the pairs of unknown force.
+std::vector<PairPress> pairs_by_force(const DrawnScene& scene, const Snapshot& snapshot) {
+  std::vector<PairPress> pairs;
+  for (const PairPress& pair : snapshot.presses) {
+    const bool drawn = pair.soft < scene.objects.size() &&
+                       (pair.other == PairPress::kAnchors || pair.other < scene.objects.size());
+    const std::string force = pair.force_N ? force_text(*pair.force_N) : "";
+    if (drawn && force != force_text(0.0)) pairs.push_back(pair);
+  }
+  std::ranges::stable_sort(pairs, std::ranges::greater{},
+                           [](const PairPress& pair) { return pair.force_N.value_or(-1.0); });
+  return pairs;
+}
+
+LegendRow pair_row(const DrawnScene& scene, const PairPress& pair) {
+  const bool anchors = pair.other == PairPress::kAnchors;
+  std::vector<glm::vec3> colours{palette::of_object(scene, pair.soft)};
+  if (!anchors) colours.push_back(palette::of_object(scene, pair.other));
+  return {.swatch = stripes(colours),
+          .name = scene.objects[pair.soft].name + " – " +
+                  (anchors ? "its anchors" : scene.objects[pair.other].name),
+          .force = pair.force_N ? force_text(*pair.force_N) : "not known",
+          .within = true};
+}
+
+// At most `most` rows: a heading, the pairs, and a count of the pairs left out.
+std::vector<LegendRow> pair_rows(const DrawnScene& scene, const Snapshot& snapshot, std::size_t most) {
+  const std::vector<PairPress> pairs = pairs_by_force(scene, snapshot);
+  most = std::min(most, kMostPairs + 1);
+  if (pairs.empty() || most < std::min<std::size_t>(pairs.size() + 1, 3)) return {};
+  std::vector<LegendRow> rows{{.name = "forces between objects"}};
+  const std::size_t shown = pairs.size() < most ? pairs.size() : most - 2;
+  for (std::size_t p = 0; p < shown; ++p) rows.push_back(pair_row(scene, pairs[p]));
+  if (shown < pairs.size()) rows.push_back({.name = and_more(pairs.size() - shown), .within = true});
+  return rows;
+}
+
 void add_tool(std::vector<LegendRow>& rows, const DrawnScene& scene, const Snapshot& snapshot) {
   const glm::dvec3 off = snapshot.device_m - snapshot.proxy_m;
   rows.push_back({.swatch = {palette::tool},
@@ -161,6 +199,8 @@ std::vector<LegendRow> legend_rows(const DrawnScene& scene, const Snapshot& snap
   if (objects + group_rows > room) objects = room - std::min(room, group_rows + 1);
   const bool cut = objects < shown.singly.size();
   std::size_t left = room - std::min(room, objects + group_rows + (cut ? 1 : 0));
+  const std::vector<LegendRow> pairs = pair_rows(scene, snapshot, left);
+  left -= pairs.size();
   for (std::size_t n = 0; n < objects; ++n) {
     const std::size_t before = rows.size() + 1;
     add_object(rows, scene, snapshot, shown.singly[n], std::min(left, kMostMaterials));
@@ -168,6 +208,7 @@ std::vector<LegendRow> legend_rows(const DrawnScene& scene, const Snapshot& snap
   }
   if (group_rows > 0) rows.push_back(grouped_row(scene, shown.grouped));
   if (cut) rows.push_back({.name = and_more(shown.singly.size() - objects)});
+  rows.insert(rows.end(), pairs.begin(), pairs.end());
   rows.insert(rows.end(), tool.begin(), tool.end());
   return rows;
 }

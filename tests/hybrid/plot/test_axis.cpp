@@ -84,6 +84,11 @@ TEST(AxisTest, HasPowersOfTenOnALogarithmicScale) {
   // An axis of a single decade has ticks between the powers of ten.
   EXPECT_EQ(Axis(Scale::logarithmic, {1.0, 10.0}, 0.0, 1.0).ticks(5),
             (std::vector<double>{1.0, 2.0, 5.0, 10.0}));
+  // One power of ten alone would give no scale.
+  for (const auto& [from, to] : {std::pair(0.11, 9.5), {0.03, 0.4}, {2.0, 9.0}, {1.0, 9.9}, {15.0, 950.0}}) {
+    for (int wanted = 3; wanted < 10; ++wanted)
+      EXPECT_GE(Axis(Scale::logarithmic, {from, to}, 0.0, 1.0).ticks(wanted).size(), 2U) << from << " " << to;
+  }
 }
 
 TEST(AxisTest, SqueezesIntervalsAndStaysInOrder) {

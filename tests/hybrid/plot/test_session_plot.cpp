@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <glm/common.hpp>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -238,6 +240,22 @@ TEST(SessionPlot, SqueezesTheAirAndSaysSo) {
   EXPECT_EQ(count(session.svg(), "long times in the air"), 0U);
 }
 
+TEST(SessionPlot, SaysTheOverlapIfTwoDecimalsShowIt) {
+  const ThreeContacts session;
+  for (const auto& [gap_m, words] : {std::pair(-2e-5, "overlap at most 1.00 % of a voxel"),
+                                     {-2e-8, "no overlap"},
+                                     {0.0, "no overlap"},
+                                     {1e-4, "no overlap"}}) {
+    const hybrid::ClearanceCourse near{
+        .t_s = {0.0, 1.0}, .rigid_m = {1e-3, gap_m}, .soft_m = {nan, nan}, .cell_m = 2e-3};
+    EXPECT_EQ(
+        count(hybrid::to_svg(hybrid::session_figure(session.rows, session.objects, "a", {.near = near})),
+              words),
+        1U)
+        << gap_m;
+  }
+}
+
 TEST(SessionPlot, ShowsTickTimesBesideTheNextTick) {
   ThreeContacts session;
   const std::string svg = session.svg();
@@ -259,6 +277,63 @@ TEST(Contacts, AMomentInTheAirDoesNotEndOne) {
   EXPECT_NEAR(contacts[0].to_s, 0.7, 1e-12);
   EXPECT_EQ(contacts[0].most_N, 3.0) << "from the first touch to the last, a moment in the air included";
   EXPECT_NEAR(contacts[0].depth_m(rows[420].device_m), 2e-3, 1e-9);
+}
+
+// Presses 2 mm down, then strokes `far_m` along x in a second. Friction is half of the normal force.
+std::vector<hybrid::TraceRow> press_and_stroke(double far_m) {
+  std::vector<hybrid::TraceRow> rows;
+  for (int i = 0; i < 1400; ++i) {
+    rows.push_back(row(i * 1e-3, 0.0, i >= 100 ? 1U : 0U));
+    const double down = std::clamp(i - 100, 0, 200) / 200.0, along = std::clamp(i - 300, 0, 1000) / 1000.0;
+    rows.back().device_m = {far_m * along, 0.0, -2e-3 * down};
+    rows.back().force_N = {along > 0.0 ? -0.5 * down : 0.0, 0.0, down};
+  }
+  return rows;
+}
+
+TEST(Contacts, AStrokeGoesFartherAcrossItsForceThanAlongIt) {
+  // The force leans by atan(0.5). Far strokes go by 0.45 of their length along it, and by 0.89 across.
+  for (const auto& [far_m, stroke] : {std::pair(0.0, false), {1e-3, false}, {0.01, true}, {0.05, true}}) {
+    const auto rows = press_and_stroke(far_m);
+    const auto contacts = hybrid::contacts_of(rows, hybrid::contact_intervals(rows, ~0U));
+    ASSERT_EQ(contacts.size(), 1U);
+    EXPECT_EQ(contacts[0].stroke, stroke) << far_m;
+  }
+}
+
+TEST(SessionPlot, DrawsStrokesOverPathLengthAndPressesOverDepth) {
+  for (const double far_m : {0.0, 0.05}) {
+    const Folder folder;
+    hybrid::save_session_plot(folder.file("a.svg"), press_and_stroke(far_m),
+                              std::vector<hybrid::PlottedObject>{{"plate", false, {}}}, "one contact");
+    const std::string svg = contents(folder.file("a.svg"));
+    EXPECT_EQ(count(svg, "one line for each stroke"), far_m > 0.0 ? 1U : 0U);
+    EXPECT_EQ(count(svg, "one line for each press"), far_m > 0.0 ? 0U : 1U);
+  }
+}
+
+// A circle of 10 mm radius in two seconds, as an encoder with steps of 0.03 mm along each axis reports it.
+TEST(Contacts, ThePathLengthIsThatOfTheWayAndNotOfTheEncodersSteps) {
+  constexpr double radius_m = 0.01, step_m = 3e-5;
+  const double whole_m = 2.0 * std::numbers::pi * radius_m;
+  std::vector<hybrid::TraceRow> exact, reported;
+  for (int i = 0; i <= 2000; ++i) {
+    const double angle = whole_m / radius_m * i / 2000.0;
+    exact.push_back(row(i * 1e-3, 1.0, 1U));
+    exact.back().device_m = radius_m * glm::dvec3(std::cos(angle), std::sin(angle), 0.0);
+    reported.push_back(exact.back());
+    reported.back().device_m = step_m * glm::round(exact.back().device_m / step_m);
+  }
+  EXPECT_NEAR(hybrid::path_length_m(exact).back(), whole_m, 1e-4 * whole_m);
+  EXPECT_NEAR(hybrid::path_length_m(exact)[1000], 0.5 * whole_m, 1e-4 * whole_m);
+  EXPECT_NEAR(hybrid::path_length_m(reported).back(), whole_m, 0.05 * whole_m);
+  // Held still, with the last bit of the encoder going to and fro.
+  for (std::size_t i = 0; i < reported.size(); ++i)
+    reported[i].device_m = {i % 2 == 0 ? 0.0 : step_m, 0.0, i % 3 == 0 ? 0.0 : step_m};
+  EXPECT_LE(hybrid::path_length_m(reported).back(), 2.0 * step_m);
+  reported[7].device_m.x = nan;
+  EXPECT_LE(hybrid::path_length_m(reported).back(), 2.0 * step_m);
+  EXPECT_TRUE(hybrid::path_length_m({}).empty());
 }
 
 TEST(Contacts, TheMostFeltStayInOrderOfTime) {

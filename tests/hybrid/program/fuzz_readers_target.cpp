@@ -161,7 +161,11 @@ void add_letters(std::string& signature, const std::string& words) {
 
 FuzzOutcome fuzz_file(const fs::path& file) {
   FuzzOutcome outcome;
-  for (const auto& read : readers().at(file.extension().string())) {
+  const auto known = readers().find(file.extension().string());
+  if (known == readers().end())
+    throw std::invalid_argument(file.string() +
+                                ": no reader; it reads .toml, .rec, .csv, .json, .tour, .png");
+  for (const auto& read : known->second) {
     try {
       const std::size_t size = read(file);
       outcome.loaded = true;

@@ -257,4 +257,37 @@ TEST_F(PairsInATrace, OfAPlateAndAnchorsAreThoseOfUniformCompression) {
   EXPECT_NEAR(columns_["between_block_anchors_N"].back(), exact_N, 0.01 * exact_N);
 }
 
+// The picture's moment and the trace compute the forces at different places of the session.
+TEST_F(PairsInATrace, AreThoseOfThePicture) {
+  const hybrid::Scene scene =
+      hybrid::load_scene(std::string(HYBRID_SOURCE_DIR) + "/scenes/edge-of-bone.toml");
+  hybrid::BuiltScene built = hybrid::build_scene(scene);
+  const hybrid::SessionResult result = hybrid::run_session(scene, built,
+                                                           {.seconds = 0.5,
+                                                            .between_samples = 1,
+                                                            .between_every_tick = true,
+                                                            .keep_picture = true,
+                                                            .progress = {}});
+  ASSERT_TRUE(result.moment.has_value());
+  ASSERT_FALSE(result.moment->presses.empty());
+  const auto tick = static_cast<std::size_t>(std::llround(result.moment->t_s / result.dt_s));
+  const auto rigid = static_cast<std::uint32_t>(built.world->rigid.size());
+  for (const hybrid::PairPress& press : result.moment->presses) {
+    const auto same = [&](const hybrid::PairCourse& course) {
+      using Kind = hybrid::ObjectPair::Kind;
+      const std::uint32_t other = course.pair.kind == Kind::anchors ? hybrid::PairPress::kAnchors
+                                  : course.pair.kind == Kind::soft  ? rigid + course.pair.other
+                                                                    : course.pair.other;
+      return press.soft == rigid + course.pair.soft && press.other == other;
+    };
+    const auto course = std::ranges::find_if(result.between.pairs, same);
+    ASSERT_NE(course, result.between.pairs.end());
+    const double traced_N = course->every_N.at(tick);
+    EXPECT_EQ(press.force_N.has_value(), std::isfinite(traced_N));
+    if (press.force_N) {
+      EXPECT_EQ(*press.force_N, traced_N);
+    }
+  }
+}
+
 }  // namespace

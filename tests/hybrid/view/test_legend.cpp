@@ -11,6 +11,7 @@
 
 #include "hybrid/build/build_world.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
+#include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/hybrid/view/picture_fixture.h"
@@ -306,6 +307,41 @@ TEST_F(MaterialPicture, TheLegendLeavesTheSceneFree) {
       DRAW_OR_SKIP(image, s, tests::small(camera));
       const glm::vec3 seen = image.at(tests::seen_at(camera, s.now.proxy_m));
       EXPECT_LT(seen.r + seen.g + seen.b, 1.2F) << "tool at " << at.x << ", " << at.y;
+    }
+  }
+}
+
+TEST(Legend, ListsThePairsThatPressOnEachOtherTheLargestForceFirst) {
+  Session s = tests::shell_and_ball();
+  s.now.presses = {{.soft = 1, .other = 0, .force_N = 0.2},
+                   {.soft = 1, .other = 0},
+                   {.soft = 1, .force_N = 0.7},
+                   {.soft = 1, .other = 0, .force_N = 0.0}};
+  const auto rows = hybrid::legend_rows(s.scene, s.now, 20);
+  EXPECT_EQ(names(rows),
+            (std::vector<std::string>{"shell", "ball", "forces between objects", "ball – its anchors",
+                                      "ball – shell", "ball – shell", "tool, as felt (proxy)",
+                                      "tool, at the device", "force on the hand"}))
+      << "a pair without a force is left out";
+  EXPECT_EQ(rows[3].force, hybrid::force_text(0.7));
+  EXPECT_EQ(rows[4].force, hybrid::force_text(0.2));
+  EXPECT_EQ(rows[5].force, "not known");
+  EXPECT_EQ(rows[3].swatch, std::vector<glm::vec3>{hybrid::palette::of_object(s.scene, 1)});
+  EXPECT_EQ(rows[4].swatch, (std::vector<glm::vec3>{hybrid::palette::of_object(s.scene, 1),
+                                                    hybrid::palette::of_object(s.scene, 0)}));
+}
+
+TEST(Legend, CountsPairsThatDoNotFitAndLeavesObjectsTheirRows) {
+  Session s = tests::shell_and_ball();
+  for (int p = 0; p < 9; ++p) s.now.presses.push_back({.soft = 1, .other = 0, .force_N = 1.0 + p});
+  for (std::size_t most = 5; most < 20; ++most) {
+    const auto rows = hybrid::legend_rows(s.scene, s.now, most);
+    EXPECT_LE(rows.size(), most);
+    EXPECT_TRUE(has(rows, "shell") && has(rows, "ball")) << most;
+    const auto pairs = std::ranges::count(names(rows), std::string("ball – shell"));
+    EXPECT_EQ(pairs > 0, most >= 8) << most;
+    if (pairs > 0) {
+      EXPECT_TRUE(has(rows, "and " + std::to_string(9 - pairs) + " more")) << most;
     }
   }
 }

@@ -181,9 +181,22 @@ int fuzz(double seconds, std::uint64_t seed, const std::filesystem::path& keep, 
   return failures == 0 ? 0 : 1;
 }
 
+int usage(const char* program) {
+  std::fprintf(stderr, "usage: %s [--seconds N] [--seed S] [--keep DIR] [--only .EXTENSION] [FILE...]\n",
+               program);
+  return 2;
+}
+
+void test_named(const char* file) {
+  const Clock::time_point start = Clock::now();
+  const tests::FuzzOutcome outcome = tests::fuzz_file(file);
+  std::printf("%s: %s, size %zu, %.3f s, %s\n", file, outcome.loaded ? "loaded" : "refused", outcome.size,
+              seconds_since(start), outcome.signature.c_str());
+}
+
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   double seconds = 10.0;
   std::uint64_t seed = 1;
   std::filesystem::path keep;
@@ -191,19 +204,26 @@ int main(int argc, char** argv) {
   bool named = false;
   for (int i = 1; i < argc; ++i) {
     const std::string option = argv[i];
-    if (option.starts_with("--") && i + 1 < argc) {
-      const char* value = argv[++i];
-      if (option == "--seconds") seconds = std::strtod(value, nullptr);
-      if (option == "--seed") seed = std::strtoull(value, nullptr, 10);
-      if (option == "--keep") keep = value;
-      if (option == "--only") only = value;
-    } else {
+    if (!option.starts_with("--")) {
       named = true;
-      const Clock::time_point start = Clock::now();
-      const tests::FuzzOutcome outcome = tests::fuzz_file(option);
-      std::printf("%s: %s, size %zu, %.3f s, %s\n", option.c_str(), outcome.loaded ? "loaded" : "refused",
-                  outcome.size, seconds_since(start), outcome.signature.c_str());
+      test_named(argv[i]);
+      continue;
+    }
+    if (++i == argc) return usage(argv[0]);
+    if (option == "--seconds") {
+      seconds = std::strtod(argv[i], nullptr);
+    } else if (option == "--seed") {
+      seed = std::strtoull(argv[i], nullptr, 10);
+    } else if (option == "--keep") {
+      keep = argv[i];
+    } else if (option == "--only") {
+      only = argv[i];
+    } else {
+      return usage(argv[0]);
     }
   }
   return named ? 0 : fuzz(seconds, seed, keep, only);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 2;
 }

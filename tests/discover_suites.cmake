@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Writes OUT, a file of ctest's with one test for each suite of PROGRAM: NAME.SUITE, with the label `fast`. Its cases are those
+# that no pattern of SLOW names, and that are not disabled.
+set(but_slow "*")
+if(SLOW)
+  set(but_slow "-${SLOW}")
+endif()
+execute_process(COMMAND ${PROGRAM} --gtest_list_tests "--gtest_filter=${but_slow}" OUTPUT_VARIABLE listed
+                COMMAND_ERROR_IS_FATAL ANY TIMEOUT 60)
+string(REGEX REPLACE "[][;]" "_" listed "${listed}") # of parameters in remarks; they would divide lists
+string(REPLACE "\n" ";" lines "${listed}")
+
+# A suite is skipped as a whole if a case was skipped and none failed: GoogleTest lists the skipped cases last.
+set(skipped "PASSED  . [0-9]+ tests?[.]\n.  SKIPPED . [0-9]+ tests?, listed below:\n(.  SKIPPED . [^\n]*\n?)+$")
+set(text "")
+set(suite "")
+foreach(line IN LISTS lines)
+  if(line MATCHES "^([^ ]+)[.]( |$)")
+    set(suite "${CMAKE_MATCH_1}")
+    set(begun FALSE)
+  elseif(line MATCHES "^  [^ ]" AND NOT line MATCHES "^  DISABLED_" AND NOT begun)
+    set(begun TRUE)
+    set(filter "${suite}.*")
+    if(SLOW)
+      string(APPEND filter "-${SLOW}")
+    endif()
+    string(APPEND text "add_test([=[${NAME}.${suite}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${filter}]=])\n"
+           "set_tests_properties([=[${NAME}.${suite}]=] PROPERTIES LABELS fast TIMEOUT 1200 SKIP_REGULAR_EXPRESSION [=[${skipped}]=])\n")
+  endif()
+endforeach()
+file(WRITE ${OUT} "${text}")
