@@ -13,6 +13,7 @@
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/triple_buffer.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/frame_meter.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
 #include "hybrid/program/viewed_scene.h"
@@ -61,8 +62,10 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
   Player& player = *viewed.player;
   Snapshot snapshot;
   ViewFiles files(command);
+  FrameMeter meter;
   double ahead_s = 0.0;  // simulated time that the frames are ahead of the ticks
   for (std::uint64_t n = 0; n < *command.frames; ++n) {
+    meter.begin();
     script.play(static_cast<double>(n) * kScriptFrame_s, window);
     const WindowInput input = window.take_input();
     PlayRequest request = request_of(input);
@@ -76,8 +79,10 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
     }
     player.snapshot(snapshot);
     snapshot.presses = input.wants_presses ? player.presses() : std::vector<PairPress>();
+    meter.end_session();
     window.add_ticks(player.samples());
     if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message()))) break;
+    meter.end();
     if (!command.out.empty()) window.save_frame(frame_file(command.out, n));
     files.save_what_was_asked(window, input, viewed, snapshot, [] { return true; });
     if (const int signal = device::stop_signal(); signal != 0) {
@@ -87,6 +92,7 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
     }
   }
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
+  fmt::print("{}\n", meter.in_words());
   return files.save_at_end(viewed) ? 0 : 1;
 }
 
