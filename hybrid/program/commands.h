@@ -160,6 +160,7 @@ struct ViewCommand {
   std::optional<std::uint64_t>
       frames;  // number of frames before the window closes; each is written to `out` if that is given
   std::filesystem::path out;
+  std::filesystem::path video;   // the frames as a video; empty: none
   std::filesystem::path drag;    // CSV of positions (t, x, y, z) that replace the mouse
   std::filesystem::path script;  // actions of a user at given times; empty: none
   std::filesystem::path record;  // recording of the session, written when the window closes; empty: none

@@ -13,7 +13,9 @@
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/base/triple_buffer.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/frame_meter.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/video.h"
 #include "hybrid/program/view_files.h"
 #include "hybrid/program/viewed_scene.h"
 #include "hybrid/session/real_device.h"
@@ -25,7 +27,8 @@ namespace hybrid {
 namespace {
 
 constexpr double kSnapshotEvery_s = 1.0 / 60.0;  // session time between two pictures of a live view
-constexpr double kScriptFrame_s = 1.0 / 30.0;    // session time of one frame of a scripted view
+constexpr int kScriptFrames_per_s = 30;
+constexpr double kScriptFrame_s = 1.0 / kScriptFrames_per_s;  // session time of one frame of a scripted view
 
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint64_t n) {
   return folder / fmt::format("frame-{:05}.png", n);
@@ -53,6 +56,29 @@ ViewScript read_script(const std::filesystem::path& file, const DrawnScene& draw
   return file.empty() ? ViewScript() : ViewScript(text_of(file), file.string(), drawn);
 }
 
+// Adds the last frame to the video of --video, if there is one.
+void add_to_video(const ViewCommand& command, Window& window, std::optional<VideoFile>& video) {
+  if (command.video.empty()) return;
+  const FramePicture frame = window.picture();
+  if (!video) video.emplace(command.video, frame.width, frame.height, kScriptFrames_per_s);
+  video->add(frame.width, frame.height, frame.rgb);
+}
+
+void keep_video(const ViewCommand& command, std::optional<VideoFile>& video) {
+  if (!video) return;
+  video->keep();
+  fmt::print("video: {}\n", command.video.string());
+}
+
+// Refuses a video that cannot be written, before the scene is built.
+void ask_video(const ViewCommand& command) {
+  if (command.video.empty()) return;
+  if (!command.frames)
+    throw std::runtime_error("--video needs --frames N, the number of frames of the video");
+  Outputs().ask("--video", command.video, {".mp4", ".mkv", ".webm"});
+  require_ffmpeg();
+}
+
 // Plays frames that each cover a fixed time, so that the pictures are the same on any machine. Returns the
 // exit status.
 int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window, ViewScript& script) {
@@ -61,8 +87,11 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
   Player& player = *viewed.player;
   Snapshot snapshot;
   ViewFiles files(command);
+  FrameMeter meter;
+  std::optional<VideoFile> video;
   double ahead_s = 0.0;  // simulated time that the frames are ahead of the ticks
   for (std::uint64_t n = 0; n < *command.frames; ++n) {
+    meter.begin();
     script.play(static_cast<double>(n) * kScriptFrame_s, window);
     const WindowInput input = window.take_input();
     PlayRequest request = request_of(input);
@@ -76,17 +105,23 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
     }
     player.snapshot(snapshot);
     snapshot.presses = input.wants_presses ? player.presses() : std::vector<PairPress>();
+    meter.end_session();
     window.add_ticks(player.samples());
     if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message()))) break;
-    if (!command.out.empty()) window.save_frame(frame_file(command.out, n));
+    meter.end();
+    if (!command.out.empty()) save_frame(window, frame_file(command.out, n));
+    add_to_video(command, window, video);
     files.save_what_was_asked(window, input, viewed, snapshot, [] { return true; });
     if (const int signal = device::stop_signal(); signal != 0) {
+      keep_video(command, video);
       fmt::print(stderr, "stopped by {} after {} of {} frames{}{}\n", signal_in_words(signal), n + 1,
                  *command.frames, command.out.empty() ? "" : ", which are in ", command.out.string());
       return exit_status_of_signal(signal);
     }
   }
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
+  keep_video(command, video);
+  fmt::print("{}\n", meter.in_words());
   return files.save_at_end(viewed) ? 0 : 1;
 }
 
@@ -276,6 +311,7 @@ int view(const ViewCommand& command) {
     throw SceneError(scene.file, scene.real_device->place,
                      "--frames needs a simulated device; add --device premium-1.5");
   }
+  ask_video(command);
   if (!command.out.empty()) std::filesystem::create_directories(command.out);
   const auto real = open_real_device(scene);
   build_viewed_scene(command, *viewed, progress_on_terminal());
@@ -283,7 +319,7 @@ int view(const ViewCommand& command) {
   print_notes(viewed->built);
   ViewScript script = read_script(command.script, viewed->drawn);
   // With --frames the pictures show only the scene, unless a script acts as the window's user.
-  Window window(viewed->drawn, {.visible = !command.frames || command.out.empty(),
+  Window window(viewed->drawn, {.visible = !command.frames || (command.out.empty() && command.video.empty()),
                                 .panels = !command.frames || !command.script.empty()});
   const device::StopOnSignal stop;
   if (real) {

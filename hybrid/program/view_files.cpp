@@ -10,6 +10,7 @@
 #include "hybrid/base/whole_file.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/session/scene_text.h"
+#include "hybrid/view/png_file.h"
 
 namespace hybrid {
 namespace {
@@ -18,6 +19,11 @@ constexpr std::chrono::seconds kShown{6};  // time for which a message is shown
 constexpr int kMostNames = 10'000;         // numbers that are tried for a new file name
 
 }  // namespace
+
+void save_frame(Window& window, const std::filesystem::path& png) {
+  const FramePicture frame = window.picture();
+  save_png(png, frame.width, frame.height, frame.rgb);
+}
 
 ViewFiles::ViewFiles(const ViewCommand& command) : command_(command) {
   require_ending_of_none("--record", command.record);
@@ -59,7 +65,7 @@ void ViewFiles::attempt(const std::string& what, std::filesystem::path file, con
 void ViewFiles::save_what_was_asked(Window& window, const WindowInput& input, const ViewedScene& viewed,
                                     const Snapshot& snapshot, const std::function<bool()>& hold) {
   if (const auto picture = window.take_screenshot())
-    attempt("Picture", *picture, ".png", [&](const auto& file) { window.save_frame(file); });
+    attempt("Picture", *picture, ".png", [&](const auto& file) { save_frame(window, file); });
   if (input.recording) {
     attempt("Recording", *input.recording, ".rec", [&](const auto& file) {
       if (!hold()) throw std::runtime_error("the session does not answer; try again");

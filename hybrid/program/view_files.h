@@ -14,6 +14,9 @@
 
 namespace hybrid {
 
+// Writes the last frame as a PNG file. Throws std::runtime_error: no frame yet, file not writable.
+void save_frame(Window& window, const std::filesystem::path& png);
+
 class ViewFiles {
  public:
   // Throws std::runtime_error if --record cannot be written.

@@ -3,11 +3,30 @@
 
 #include "hybrid/view/layout.h"
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 namespace hybrid {
+namespace {
+
+// A driver without a graphics card allocates megabytes in every draw call and frees them again. By default
+// the C library gives such blocks back to the system, which then has to clear their pages for the next frame.
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  constexpr int kLargestKept = 32 << 20;  // bytes of a block; the C library accepts no more
+  constexpr int kMostKept = 256 << 20;    // bytes that are free
+  mallopt(M_MMAP_THRESHOLD, kLargestKept);
+  mallopt(M_TRIM_THRESHOLD, kMostKept);
+#endif
+}
+
+}  // namespace
 
 FramePainter::FramePainter(const DrawnScene& scene, Samples samples, int height)
     : scene_(scene), renderer_(scene, samples), overlay_(height) {
   renderer_.set_font(overlay_.font());
+  if (samples == Samples::fast && draws_in_software()) keep_freed_memory();
 }
 
 void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options) {

@@ -4,7 +4,9 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <glm/gtc/type_ptr.hpp>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -14,6 +16,8 @@
 
 namespace hybrid {
 namespace {
+
+constexpr int kMostPixelsOfPicture = 8192;  // along each side
 
 GLuint compile(GLenum kind, const char* source) {
   const GLuint shader = glCreateShader(kind);
@@ -61,6 +65,29 @@ void check_gl(const char* doing) {
                            "; update the graphics driver, or set LIBGL_ALWAYS_SOFTWARE=1 to draw without it");
 }
 
+void set_uniform(GLuint program, const char* name, float value) {
+  glUniform1f(glGetUniformLocation(program, name), value);
+}
+void set_uniform(GLuint program, const char* name, int value) {
+  glUniform1i(glGetUniformLocation(program, name), value);
+}
+void set_uniform(GLuint program, const char* name, const glm::vec3& value) {
+  glUniform3fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
+}
+void set_uniform(GLuint program, const char* name, const glm::vec4& value) {
+  glUniform4fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
+}
+void set_uniform(GLuint program, const char* name, const glm::mat3& value) {
+  glUniformMatrix3fv(glGetUniformLocation(program, name), 1, GL_FALSE, glm::value_ptr(value));
+}
+void set_uniform(GLuint program, const char* name, const glm::mat4& value) {
+  glUniformMatrix4fv(glGetUniformLocation(program, name), 1, GL_FALSE, glm::value_ptr(value));
+}
+void set_uniform(GLuint program, const char* name, std::span<const glm::vec3> values) {
+  glUniform3fv(glGetUniformLocation(program, name), static_cast<GLsizei>(values.size()),
+               glm::value_ptr(values.front()));
+}
+
 GLuint link_program(const char* vertex, const char* fragment) {
   const GLuint program = glCreateProgram();
   const GLuint parts[] = {compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)};
@@ -73,6 +100,10 @@ GLuint link_program(const char* vertex, const char* fragment) {
   glGetProgramiv(program, GL_LINK_STATUS, &good);
   if (good != GL_TRUE) throw std::runtime_error("the graphics driver cannot link a shader; update it");
   return program;
+}
+
+void delete_program(GLuint program) {
+  glDeleteProgram(program);
 }
 
 const void* buffer_offset(std::size_t bytes) {
@@ -125,6 +156,14 @@ void GlMesh::draw() const {
   glDrawElements(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr);
 }
 
+void GlMesh::draw_seen(const glm::mat4& clip_from_mesh, float margin) const {
+  glBindVertexArray(array);
+  for (const IndexRange& range : seen_ranges(parts, clip_from_mesh, margin)) {
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(range.count), GL_UNSIGNED_INT,
+                   buffer_offset(range.first * sizeof(std::uint32_t)));
+  }
+}
+
 void GlMesh::release() {
   glDeleteVertexArrays(1, &array);
   for (const GLuint* buffer : {&vertices, &indices, &colours}) {
@@ -154,6 +193,46 @@ void attach_targets(GLuint frame, GLuint colour, GLuint depth) {
     throw std::runtime_error(
         "the graphics driver cannot draw into a picture of this size; ask for a smaller one");
   }
+}
+
+void RenderTargets::create() {
+  glGenFramebuffers(1, &scene_frame);
+  glGenFramebuffers(1, &shown_frame);
+  glGenFramebuffers(1, &final_frame);
+}
+
+void RenderTargets::release() {
+  const std::array textures{scene_colour, scene_depth, shown_depth, final_colour};
+  glDeleteTextures(textures.size(), textures.data());
+  const std::array frames{scene_frame, shown_frame, final_frame};
+  glDeleteFramebuffers(frames.size(), frames.data());
+}
+
+int RenderTargets::set_size(int width, int height, int wanted) {
+  if (width < 1 || height < 1 || width > kMostPixelsOfPicture || height > kMostPixelsOfPicture) {
+    throw std::runtime_error("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+                             " pixels cannot be drawn; each side must be from 1 to " +
+                             std::to_string(kMostPixelsOfPicture));
+  }
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  int factor = wanted;
+  while (factor > 1 && std::max(width, height) * factor > std::min(most, kMostPixelsOfPicture)) --factor;
+  const int w = width * factor;
+  const int h = height * factor;
+  if (w == built_width && h == built_height) return factor;
+  const std::array old{scene_colour, scene_depth, shown_depth, final_colour};
+  glDeleteTextures(old.size(), old.data());
+  scene_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, w, h);
+  scene_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
+  shown_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
+  final_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
+  attach_targets(scene_frame, scene_colour, scene_depth);
+  attach_targets(shown_frame, 0, shown_depth);
+  attach_targets(final_frame, final_colour, 0);
+  built_width = w;
+  built_height = h;
+  return factor;
 }
 
 void GlOverlay::create() {

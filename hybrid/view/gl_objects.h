@@ -5,10 +5,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <span>
 #include <vector>
 
 #include "hybrid/view/layout.h"
+#include "hybrid/view/mesh_parts.h"
 #include "hybrid/view/unit_shapes.h"
 
 namespace hybrid {
@@ -25,8 +30,18 @@ void require_gl();
 // Throws std::runtime_error if OpenGL has reported an error; `doing` completes "error while …".
 void check_gl(const char* doing);
 
+// Sets a uniform of the program in use.
+void set_uniform(GlName program, const char* name, float value);
+void set_uniform(GlName program, const char* name, int value);
+void set_uniform(GlName program, const char* name, const glm::vec3& value);
+void set_uniform(GlName program, const char* name, const glm::vec4& value);
+void set_uniform(GlName program, const char* name, const glm::mat3& value);
+void set_uniform(GlName program, const char* name, const glm::mat4& value);
+void set_uniform(GlName program, const char* name, std::span<const glm::vec3> values);
+
 // Compiles and links a program. Throws std::runtime_error with the driver's log.
 GlName link_program(const char* vertex, const char* fragment);
+void delete_program(GlName program);
 
 // A byte offset into a buffer, as the pointer that OpenGL takes.
 const void* buffer_offset(std::size_t bytes);
@@ -35,6 +50,7 @@ const void* buffer_offset(std::size_t bytes);
 struct GlMesh {
   GlName array = 0, vertices = 0, indices = 0, colours = 0;
   int count = 0;
+  std::vector<MeshPart> parts{};  // of the indices, for draw_seen()
 
   // Throws std::runtime_error when the mesh has too many triangles for one draw call.
   void upload(const DrawMesh& mesh, GlEnum usage);
@@ -43,6 +59,8 @@ struct GlMesh {
   // Replaces the vertices. Orphans the old storage, so that the driver need not wait for the previous frame.
   void stream(const DrawMesh& mesh) const;
   void draw() const;
+  // Draws the parts that may be in the view. `margin`: as of seen_ranges().
+  void draw_seen(const glm::mat4& clip_from_mesh, float margin) const;
   // Deletes the buffers. The mesh is empty afterwards.
   void release();
 };
@@ -52,6 +70,21 @@ GlName make_texture_target(GlEnum inner, GlEnum outer, GlEnum type, int width, i
 
 // Attaches textures to a framebuffer (0: none) and binds it. Throws std::runtime_error if the driver refuses.
 void attach_targets(GlName frame, GlName colour, GlName depth);
+
+// The textures into which a frame is drawn, and their framebuffers.
+struct RenderTargets {
+  GlName scene_frame = 0, scene_colour = 0, scene_depth = 0;
+  GlName shown_frame = 0, shown_depth = 0;  // depth of what must not be hidden
+  GlName final_frame = 0, final_colour = 0;
+  int built_width = 0, built_height = 0;  // of the scene's textures (pixels)
+
+  void create();
+  void release();
+  // Builds the textures anew if the size (pixels) has changed. Returns the samples per pixel along each axis:
+  // `wanted`, or fewer if the driver's textures would be too small. Throws std::runtime_error if a side is
+  // not from 1 to 8192 pixels.
+  int set_size(int width, int height, int wanted);
+};
 
 // A vertex of the overlay: position in pixels (y down), texture coordinates in the font atlas, colour
 // 0xAABBGGRR.

@@ -8,15 +8,14 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
-#include <glm/gtc/type_ptr.hpp>
 #include <limits>
 #include <span>
 #include <stdexcept>
 
 #include "hybrid/view/gl_objects.h"
 #include "hybrid/view/palette.h"
-#include "hybrid/view/renderer_shaders.h"
 #include "hybrid/view/section.h"
+#include "hybrid/view/shading.h"
 #include "hybrid/view/tool_and_arrow.h"
 #include "hybrid/view/unit_shapes.h"
 #include "polygon/mesh/is_finite.h"
@@ -24,101 +23,114 @@
 namespace hybrid {
 namespace {
 
+constexpr glm::vec4 kKeepAll{0.0F, 0.0F, 0.0F, 1.0F};  // a plane that clips nothing
+
 struct Object {
   GlMesh mesh;
-  DrawMesh moving;  // used by soft objects only
+  DrawMesh moving;                 // used by soft objects only
+  std::vector<glm::vec3> moved_m;  // displacements that are uploaded; of soft objects only
+  float most_moved_m = 0.0F;
   bool soft = false;
+  bool lit_by_vertex = false;
+  bool closed = false;  // as is_closed_outwards() says
   glm::vec3 colour{1.0F};
-  SceneBounds bounds;                      // at rest
-  glm::mat4 placed{1.0F};                  // from the uploaded pose to the present one
-  GlMesh face;                             // face of a cut in the present view; empty: no cut
-  glm::vec4 kept{0.0F, 0.0F, 0.0F, 1.0F};  // plane of the cut: the part on its positive side is drawn
+  SceneBounds bounds;        // at rest
+  glm::mat4 placed{1.0F};    // from the uploaded pose to the present one
+  GlMesh face;               // face of a cut in the present view; empty: no cut
+  glm::vec4 kept{kKeepAll};  // plane of the cut: the part on its positive side is drawn
 };
 
-constexpr int most_pixels = 8192;
+// Without a graphics card, meshes of more triangles are lit at their vertices. In a window such triangles are
+// a few pixels large.
+constexpr std::size_t kLitByVertex = 10'000;
 constexpr double kDepthApart = 5e-4;  // share of the view's height: about half a pixel
 
 }  // namespace
 
 struct Renderer::State {
-  GLuint mesh_program = 0, depth_program = 0;
-  GLuint program = 0;  // the program in use: mesh_program or depth_program
+  ShadingPrograms programs;
+  GLuint program = 0;               // the program in use
+  glm::mat4 clip{1.0F};             // clip_from_scene of the program in use
+  glm::vec3 eye{0.0F};              // relative to origin_m
+  glm::vec3 right{0.0F}, up{0.0F};  // axes of the camera
+  float nearer = 0.0F;              // as in the shader
+  float apart = 0.0F;               // kDepthApart in the present view (m)
   std::vector<Object> objects;
   GlMesh ball, cylinder, cone, disc;
   GlOverlay overlay;
   ViewSettings view;
-  GLuint scene_frame = 0, scene_colour = 0, scene_depth = 0;
-  GLuint shown_frame = 0, shown_depth = 0;
-  GLuint final_frame = 0, final_colour = 0;
-  int width = 0, height = 0, factor = 1, wanted_factor = 1, built_width = 0, built_height = 0;
+  RenderTargets targets;
+  int width = 0, height = 0, factor = 1, wanted_factor = 1;
   SceneBounds bounds;        // at rest
   glm::dvec3 origin_m{0.0};  // uploaded positions are floats relative to this point
   double most_moved_m = 0.0;
 
-  void use(GLuint which, const glm::mat4& clip) {
-    program = which;
+  // Uses a program, in the present view. Uniforms that a program does not have are ignored.
+  void use(Shading shading, bool by_vertex = false) {
+    program = programs.of(shading, by_vertex);
     glUseProgram(program);
-    glUniformMatrix4fv(glGetUniformLocation(program, "clip_from_scene"), 1, GL_FALSE, glm::value_ptr(clip));
+    uniform("clip_from_scene", clip);
+    uniform("eye", eye);
+    uniform("light_right", right);
+    uniform("light_up", up);
+    uniform("apart", apart);
+    uniform("nearer", nearer);
     uniform("shown_depth", 0);
+    uniform("coloured_vertices", 0);
+    uniform("clip_plane", kKeepAll);
+    uniform("kept", kKeepAll);
+    if (shading != Shading::tissue) return;
+    uniform("moved_ramp", palette::moved);
+    uniform("own_until", palette::kOwnUntil);
+    uniform("ramp_from", palette::kRampFrom);
   }
-  void uniform(const char* name, float value) const {
-    glUniform1f(glGetUniformLocation(program, name), value);
-  }
-  void uniform(const char* name, int value) const { glUniform1i(glGetUniformLocation(program, name), value); }
-  void uniform(const char* name, const glm::vec3& value) const {
-    glUniform3fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
-  }
-  void uniform(const char* name, const glm::vec4& value) const {
-    glUniform4fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
-  }
-  void uniform(const char* name, std::span<const glm::vec3> values) const {
-    glUniform3fv(glGetUniformLocation(program, name), static_cast<GLsizei>(values.size()),
-                 glm::value_ptr(values.front()));
+  template <class Value>
+  void uniform(const char* name, const Value& value) const {
+    set_uniform(program, name, value);
   }
   void place(const glm::mat4& scene_from_mesh) const {
     // The inverse transpose keeps normals perpendicular under non-uniform scale.
     const glm::mat3 normal = glm::transpose(glm::inverse(glm::mat3(scene_from_mesh)));
-    glUniformMatrix4fv(glGetUniformLocation(program, "scene_from_mesh"), 1, GL_FALSE,
-                       glm::value_ptr(scene_from_mesh));
-    glUniformMatrix3fv(glGetUniformLocation(program, "normal_from_mesh"), 1, GL_FALSE,
-                       glm::value_ptr(normal));
+    uniform("scene_from_mesh", scene_from_mesh);
+    uniform("normal_from_mesh", normal);
   }
-  void build_targets();
   void cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera);
-  void draw_objects(bool soft, int pass) const;
+  // The rectangle in samples of the scene's textures, y up from the bottom.
+  [[nodiscard]] PixelRect samples_of(const PixelRect& where) const {
+    return {where.x * factor, (height - where.y - where.height) * factor, where.width * factor,
+            where.height * factor};
+  }
+  void copy_depth(const PixelRect& where) const;
+  void draw_objects(bool soft, Shading shading);
   void draw_object(const Object& object, float alpha) const;
-  void draw_translucent(const glm::mat4& clip);
+  [[nodiscard]] bool is_outside(const Object& object, float margin) const;  // is the eye?
+  void draw_translucent();
   void draw_tool(const DrawnScene& scene, const glm::dvec3& at) const;
   void draw_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) const;
 };
 
-void Renderer::State::build_targets() {
-  const int w = width * factor;
-  const int h = height * factor;
-  if (w == built_width && h == built_height) return;
-  const GLuint old[] = {scene_colour, scene_depth, shown_depth, final_colour};
-  glDeleteTextures(4, old);
-  scene_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, w, h);
-  scene_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
-  shown_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
-  final_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
-  attach_targets(scene_frame, scene_colour, scene_depth);
-  attach_targets(shown_frame, 0, shown_depth);
-  attach_targets(final_frame, final_colour, 0);
-  built_width = w;
-  built_height = h;
+// Copies the scene's depth of a part of the frame to shown_depth.
+void Renderer::State::copy_depth(const PixelRect& where) const {
+  const PixelRect r = samples_of(where);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, targets.scene_frame);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, targets.shown_frame);
+  glBlitFramebuffer(r.x, r.y, r.x + r.width, r.y + r.height, r.x, r.y, r.x + r.width, r.y + r.height,
+                    GL_DEPTH_BUFFER_BIT, GL_NEAREST);
 }
 
 // Draws the opaque objects that are soft, or those that are rigid.
-void Renderer::State::draw_objects(bool soft, int pass) const {
-  uniform("pass", pass);
+void Renderer::State::draw_objects(bool soft, Shading shading) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
     const ObjectLook look = view.look_of(i);
-    if (objects[i].soft == soft && look.visible && look.opacity >= 1.0F) draw_object(objects[i], 1.0F);
+    if (objects[i].soft != soft || !look.visible || look.opacity < 1.0F) continue;
+    use(shading, objects[i].lit_by_vertex);
+    draw_object(objects[i], 1.0F);
   }
-  uniform("moved_scale", 0.0F);
-  uniform("coloured_vertices", 0);
-  uniform("pass", 0);
+}
+
+bool Renderer::State::is_outside(const Object& object, float margin) const {
+  const glm::vec3 centre(object.placed * glm::vec4(glm::vec3(object.bounds.centre_m - origin_m), 1.0F));
+  return glm::distance(eye, centre) > static_cast<float>(object.bounds.radius_m) + margin;
 }
 
 void Renderer::State::draw_object(const Object& object, float alpha) const {
@@ -130,43 +142,48 @@ void Renderer::State::draw_object(const Object& object, float alpha) const {
   uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
   uniform("moved_scale", object.soft ? static_cast<float>(most_moved_m) : 0.0F);
   uniform("kept", object.kept);
-  const auto clip = clip_equation(view.clip, bounds, origin_m);
-  uniform("clip_plane", clip.value_or(glm::vec4(0.0F, 0.0F, 0.0F, 1.0F)));
-  if (clip) glEnable(GL_CLIP_DISTANCE1);
+  const auto clip_plane = clip_equation(view.clip, bounds, origin_m);
+  uniform("clip_plane", clip_plane.value_or(kKeepAll));
+  if (clip_plane) glEnable(GL_CLIP_DISTANCE1);
   if (object.face.count > 0) glEnable(GL_CLIP_DISTANCE0);
-  object.mesh.draw();
+  // A closed object that is whole shows no back of a triangle to an eye outside it.
+  const float margin = object.most_moved_m + apart;
+  const bool backs_hidden =
+      object.closed && !clip_plane && object.face.count == 0 && is_outside(object, margin);
+  if (backs_hidden) glEnable(GL_CULL_FACE);
+  object.mesh.draw_seen(clip * object.placed, margin);
+  if (backs_hidden) glDisable(GL_CULL_FACE);
   glDisable(GL_CLIP_DISTANCE0);
   if (object.face.count > 0) {
     // The face lies in the cut's plane, so rounding could clip it. Use a plane that keeps all.
-    uniform("kept", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
+    uniform("kept", kKeepAll);
     uniform("coloured_vertices", 1);
     uniform("moved_scale", 0.0F);
     object.face.draw();
   }
   glDisable(GL_CLIP_DISTANCE1);
   // Some drivers clip even when clipping is switched off. This plane keeps tool and arrow whole.
-  uniform("clip_plane", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
+  uniform("clip_plane", kKeepAll);
 }
 
-// Of translucent objects only the nearest surface is blended. A depth-only pass finds this surface first, so
-// the order of the triangles does not matter.
-void Renderer::State::draw_translucent(const glm::mat4& clip) {
-  const auto draw_all = [this] {
-    uniform("nearer", 0.0F);
+// Of translucent objects only the nearest surface is blended, which a depth-only pass finds first.
+void Renderer::State::draw_translucent() {
+  const auto draw_all = [this](bool depth_only) {
     for (std::size_t i = 0; i < objects.size(); ++i) {
       const ObjectLook look = view.look_of(i);
-      if (look.visible && look.opacity < 1.0F && look.opacity > 0.0F) draw_object(objects[i], look.opacity);
+      if (!look.visible || look.opacity >= 1.0F || look.opacity <= 0.0F) continue;
+      use(depth_only        ? Shading::depth
+          : objects[i].soft ? Shading::tissue
+                            : Shading::plain,
+          objects[i].lit_by_vertex);
+      draw_object(objects[i], look.opacity);
     }
-    uniform("moved_scale", 0.0F);
-    uniform("coloured_vertices", 0);
   };
   glDepthMask(GL_TRUE);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  use(depth_program, clip);
-  draw_all();
-  use(mesh_program, clip);
+  draw_all(true);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  draw_all();
+  draw_all(false);
 }
 
 void Renderer::State::cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) {
@@ -204,8 +221,7 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   State& s = *state_;
   require_gl();
   s.wanted_factor = draws_in_software() && samples == Samples::fast ? 1 : 2;
-  s.mesh_program = link_program(shaders::mesh_vertex, shaders::mesh_fragment);
-  s.depth_program = link_program(shaders::mesh_vertex, shaders::depth_fragment);
+  s.programs.create();
   s.bounds = bounds_of(scene);
   s.origin_m = s.bounds.centre_m;
   s.objects.resize(scene.objects.size());
@@ -216,7 +232,11 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
     object.bounds = bounds_of(scene.objects[i].surface);
     DrawMesh mesh = object.soft ? make_moving_mesh(scene.objects[i].surface, s.origin_m)
                                 : make_draw_mesh(scene.objects[i].surface, s.origin_m);
+    object.lit_by_vertex = s.wanted_factor == 1 && mesh.indices.size() / 3 > kLitByVertex;
+    object.closed = is_closed_outwards(scene.objects[i].surface);
+    std::vector<MeshPart> parts = divide_mesh(mesh);
     object.mesh.upload(mesh, object.soft ? GL_STREAM_DRAW : GL_STATIC_DRAW);
+    object.mesh.parts = std::move(parts);
     const std::vector<VertexColour> colours = colours_of_vertices(scene, i);
     if (object.soft && colours.size() == mesh.vertices.size() && !colours.empty())
       object.mesh.upload_colours(colours);
@@ -228,9 +248,7 @@ Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_
   s.disc.upload(make_unit_disc(), GL_STATIC_DRAW);
 
   s.overlay.create();
-  glGenFramebuffers(1, &s.scene_frame);
-  glGenFramebuffers(1, &s.shown_frame);
-  glGenFramebuffers(1, &s.final_frame);
+  s.targets.create();
   check_gl("uploading the scene");
 }
 
@@ -245,11 +263,8 @@ void Renderer::release() {
   }
   for (GlMesh* mesh : {&s.ball, &s.cylinder, &s.cone, &s.disc}) mesh->release();
   s.overlay.release();
-  const std::array textures{s.scene_colour, s.scene_depth, s.shown_depth, s.final_colour};
-  glDeleteTextures(textures.size(), textures.data());
-  const std::array frames{s.scene_frame, s.shown_frame, s.final_frame};
-  glDeleteFramebuffers(frames.size(), frames.data());
-  for (const GLuint used : {s.mesh_program, s.depth_program}) glDeleteProgram(used);
+  s.targets.release();
+  s.programs.release();
 }
 
 void Renderer::set_font(const FontAtlas& atlas) {
@@ -262,18 +277,8 @@ void Renderer::set_view(const ViewSettings& view) {
 
 void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height) {
   State& s = *state_;
-  if (width < 1 || height < 1 || width > most_pixels || height > most_pixels) {
-    throw std::runtime_error("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
-                             " pixels cannot be drawn; each side must be from 1 to " +
-                             std::to_string(most_pixels));
-  }
-  GLint most = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
-  s.width = width;
-  s.height = height;
-  s.factor = s.wanted_factor;
-  while (s.factor > 1 && std::max(width, height) * s.factor > std::min(most, most_pixels)) --s.factor;
-  s.build_targets();
+  s.width = width, s.height = height;
+  s.factor = s.targets.set_size(width, height, s.wanted_factor);
   for (std::size_t i = 0; i < s.objects.size(); ++i) {
     Object& object = s.objects[i];
     object.placed = place_rigid(snapshot.place_of(i), s.origin_m);
@@ -281,14 +286,17 @@ void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int widt
     const auto& rest = scene.objects[i].surface.vertices;
     if (snapshot.soft_moved_m[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
       continue;
-    const double moved = move_vertices(object.moving, rest, snapshot.soft_moved_m[i], s.origin_m);
+    if (object.moved_m == snapshot.soft_moved_m[i]) continue;
+    object.moved_m = snapshot.soft_moved_m[i];
+    object.most_moved_m = move_vertices(object.moving, rest, object.moved_m, s.origin_m);
     object.mesh.stream(object.moving);
     // Displacements below a thousandth of the tool's radius do not start a scale, so that rounding does not
     // show as a pattern.
     const double least = 1e-3 * scene.tool_radius_m;
-    if (moved > std::max(s.most_moved_m, least)) s.most_moved_m = palette::scale_end(moved);
+    if (object.most_moved_m > std::max(s.most_moved_m, least))
+      s.most_moved_m = palette::scale_end(object.most_moved_m);
   }
-  glBindFramebuffer(GL_FRAMEBUFFER, s.scene_frame);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.scene_frame);
   glDisable(GL_SCISSOR_TEST);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   const glm::vec3& background = s.view.dark ? palette::dark_background : palette::background;
@@ -312,26 +320,22 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     if (place.moved && polygon::is_finite(at))
       radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 1.1 * s.objects[i].bounds.radius_m);
   }
-  const glm::mat4 clip(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
-                                              s.bounds.centre_m, radius));
+  s.clip = glm::mat4(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
+                                            s.bounds.centre_m, radius));
   s.cut_objects(scene, snapshot, camera);
-  const glm::vec3 eye(camera.eye_m() - s.origin_m);
+  s.eye = glm::vec3(camera.eye_m() - s.origin_m);
   // Where surfaces coincide, rounding would choose between them pixel by pixel. So rigid surfaces are drawn
   // nearer to the eye by this length. A rigid surface counts as hiding tissue only if it is nearer than the
   // tissue by more than this length.
-  const auto apart = static_cast<float>(kDepthApart * camera.view_height_m());
-  s.use(s.mesh_program, clip);
-  s.uniform("eye", eye);
-  s.uniform("light_right", glm::vec3(camera.right()));
-  s.uniform("light_up", glm::vec3(camera.up()));
-  s.uniform("moved_ramp", palette::moved);
-  s.uniform("own_until", palette::kOwnUntil);
-  s.uniform("ramp_from", palette::kRampFrom);
+  s.apart = static_cast<float>(kDepthApart * camera.view_height_m());
+  s.right = glm::vec3(camera.right());
+  s.up = glm::vec3(camera.up());
+  s.nearer = 0.0F;
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, 0);
-  const int bottom = s.height - where.y - where.height;
-  glViewport(where.x * s.factor, bottom * s.factor, where.width * s.factor, where.height * s.factor);
-  glScissor(where.x * s.factor, bottom * s.factor, where.width * s.factor, where.height * s.factor);
+  const PixelRect pixels = s.samples_of(where);
+  glViewport(pixels.x, pixels.y, pixels.width, pixels.height);
+  glScissor(pixels.x, pixels.y, pixels.width, pixels.height);
   glEnable(GL_SCISSOR_TEST);
   glEnable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
@@ -339,26 +343,23 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glDepthFunc(GL_LEQUAL);
   glDepthMask(GL_TRUE);
 
-  // Draws the depth of all that must not be hidden: soft objects, the arrow, and a disc a little larger than
-  // the tool.
-  s.use(s.depth_program, clip);
-  s.uniform("eye", eye);
-  glBindFramebuffer(GL_FRAMEBUFFER, s.shown_frame);
-  glClear(GL_DEPTH_BUFFER_BIT);
-  s.uniform("nearer", 2.0F * apart);
-  s.draw_objects(true, 0);
-  s.uniform("nearer", 0.0F);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.scene_frame);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  s.draw_objects(true, Shading::tissue);
+
+  // The depth of all that must not be hidden: soft objects, the arrow, and a disc a little larger than the
+  // tool. Copying the soft objects' depth costs less than drawing them again.
+  s.copy_depth(where);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.shown_frame);
   if (tool_known) {
+    s.use(Shading::depth);
     s.place(place_tool_disc(scene, snapshot.proxy_m, camera, s.origin_m));
     s.disc.draw();
     s.draw_arrow(scene, snapshot, camera);
   }
-
-  s.use(s.mesh_program, clip);
-  glBindFramebuffer(GL_FRAMEBUFFER, s.scene_frame);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  s.draw_objects(true, 0);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.scene_frame);
   const auto draw_felt = [&](float alpha) {
+    s.use(Shading::plain);
     s.uniform("alpha", alpha);
     s.uniform("shine", 0.45F);
     s.uniform("own_colour", s.view.dark ? palette::dark_tool : palette::tool);
@@ -368,10 +369,10 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     s.draw_arrow(scene, snapshot, camera);
   };
   if (tool_known) draw_felt(1.0F);
-  glBindTexture(GL_TEXTURE_2D, s.shown_depth);
-  s.uniform("nearer", apart);
-  s.draw_objects(false, 1);
-  s.uniform("nearer", 0.0F);
+  glBindTexture(GL_TEXTURE_2D, s.targets.shown_depth);
+  s.nearer = s.apart;
+  s.draw_objects(false, Shading::unhiding);
+  s.nearer = 0.0F;
 
   glEnable(GL_BLEND);
   glEnable(GL_CULL_FACE);  // otherwise closed transparent shapes would be blended twice
@@ -379,48 +380,46 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   if (tool_known) {
     glDepthFunc(GL_GREATER);
     draw_felt(0.28F);
-    glDepthFunc(GL_LEQUAL);
     const bool device_is_off = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
     if (device_is_off && polygon::is_finite(snapshot.device_m)) {
       glDepthFunc(GL_ALWAYS);  // draw always: the device point lies inside an object
-      s.uniform("pass", 3);
+      s.use(Shading::glass);
       s.uniform("own_colour", palette::device);
+      s.uniform("shine", 0.1F);
       s.draw_tool(scene, snapshot.device_m);
-      s.uniform("pass", 0);
-      glDepthFunc(GL_LEQUAL);
     }
+    glDepthFunc(GL_LEQUAL);
   }
   glDisable(GL_CULL_FACE);
   // Rigid surfaces in front of soft objects and of the tool: only the nearest surface is blended. A
   // depth-only pass finds that surface.
   glDepthMask(GL_TRUE);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  s.use(s.depth_program, clip);
-  s.uniform("nearer", apart);
-  s.draw_objects(false, 2);
-  s.use(s.mesh_program, clip);
-  s.uniform("nearer", apart);
+  s.nearer = s.apart;
+  s.draw_objects(false, Shading::hiding_depth);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  s.draw_objects(false, 2);
-  s.uniform("nearer", 0.0F);
-  s.draw_translucent(clip);
+  glDepthFunc(GL_EQUAL);  // draws rigid surfaces that hide nothing once more, in the same colour
+  s.draw_objects(false, Shading::hiding);
+  glDepthFunc(GL_LEQUAL);
+  s.nearer = 0.0F;
+  s.draw_translucent();
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
 }
 
 void Renderer::finish(const OverlayMesh& overlay) {
   State& s = *state_;
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, s.scene_frame);
-  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, s.final_frame);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, s.targets.scene_frame);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, s.targets.final_frame);
   glBlitFramebuffer(0, 0, s.width * s.factor, s.height * s.factor, 0, 0, s.width, s.height,
                     GL_COLOR_BUFFER_BIT, s.factor == 1 ? GL_NEAREST : GL_LINEAR);
-  glBindFramebuffer(GL_FRAMEBUFFER, s.final_frame);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.final_frame);
   s.overlay.draw(overlay, s.width, s.height);
   check_gl("drawing the scene");
 }
 
 void Renderer::present(int width, int height) {
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, state_->final_frame);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, state_->targets.final_frame);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
   glBlitFramebuffer(0, 0, state_->width, state_->height, 0, 0, width, height, GL_COLOR_BUFFER_BIT,
                     GL_NEAREST);
@@ -432,7 +431,7 @@ std::vector<std::uint8_t> Renderer::read_rgb() {
   const auto row = static_cast<std::size_t>(s.width) * 3;
   std::vector<std::uint8_t> up(row * static_cast<std::size_t>(s.height));
   std::vector<std::uint8_t> down(up.size());
-  glBindFramebuffer(GL_FRAMEBUFFER, s.final_frame);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.final_frame);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, s.width, s.height, GL_RGB, GL_UNSIGNED_BYTE, up.data());
   check_gl("reading a frame");

@@ -18,7 +18,6 @@
 #include <utility>
 
 #include "hybrid/view/frame_painter.h"
-#include "hybrid/view/png_file.h"
 #include "hybrid/window/window_keys.h"
 
 namespace hybrid {
@@ -440,11 +439,11 @@ Camera& Window::camera() {
   return state_->camera;
 }
 
-void Window::save_frame(const std::filesystem::path& png) {
+FramePicture Window::picture() {
   State& s = *state_;
-  if (!s.painted) throw std::runtime_error(png.string() + ": there is no frame to save yet; show one first");
+  if (!s.painted) throw std::runtime_error("there is no frame to save yet; show one first");
   glfwMakeContextCurrent(s.window.get());
-  save_png(png, std::min(s.width, kMostPixels), std::min(s.height, kMostPixels), s.painter->read_rgb());
+  return {std::min(s.width, kMostPixels), std::min(s.height, kMostPixels), s.painter->read_rgb()};
 }
 
 }  // namespace hybrid

@@ -8,6 +8,7 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
@@ -35,6 +36,12 @@ struct WindowInput {
   std::vector<Edit> edits;
   std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name
   bool save_scene = false, reload = false;
+};
+
+// A frame's pixels: rows from the top, three bytes (RGB) each.
+struct FramePicture {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;
 };
 
 class Window {
@@ -65,8 +72,8 @@ class Window {
   // The view. It may be changed between frames.
   [[nodiscard]] Camera& camera();
 
-  // Writes the last frame as a PNG file. Throws std::runtime_error: no frame yet, file not writable.
-  void save_frame(const std::filesystem::path& png);
+  // The last frame. Throws std::runtime_error if there is none yet.
+  [[nodiscard]] FramePicture picture();
   // The file of the picture that the user asked for since the last call; empty path: an unused name.
   [[nodiscard]] std::optional<std::filesystem::path> take_screenshot();
 

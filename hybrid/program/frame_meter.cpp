@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/program/frame_meter.h"
+
+#include <fmt/format.h>
+
+#include <ctime>
+
+namespace hybrid {
+namespace {
+
+double clock_s(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace
+
+void FrameMeter::begin() {
+  start_ = std::chrono::steady_clock::now();
+  cpu_start_s_ = clock_s(CLOCK_PROCESS_CPUTIME_ID);
+  thread_start_s_ = clock_s(CLOCK_THREAD_CPUTIME_ID);
+}
+
+void FrameMeter::end_session() {
+  session_now_s_ = clock_s(CLOCK_THREAD_CPUTIME_ID) - thread_start_s_;
+}
+
+void FrameMeter::end() {
+  if (++frames_ <= kWarmUp) return;
+  time_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  cpu_s_ += clock_s(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_s_;
+  session_s_ += session_now_s_;
+}
+
+std::string FrameMeter::in_words() const {
+  if (frames_ <= kWarmUp) return fmt::format("the cost of a frame is known from {} frames on", kWarmUp + 1);
+  const auto counted = static_cast<double>(frames_ - kWarmUp);
+  return fmt::format(
+      "{:.1f} frames/s; a frame takes {:.1f} ms, and {:.1f} ms of processor time: {:.1f} ms for the session, "
+      "{:.1f} ms for the window",
+      counted / time_s_, 1e3 * time_s_ / counted, 1e3 * cpu_s_ / counted, 1e3 * session_s_ / counted,
+      1e3 * (cpu_s_ - session_s_) / counted);
+}
+
+}  // namespace hybrid

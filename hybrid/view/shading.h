@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The programs that shade surfaces, one for each kind of shading. A driver without a graphics card computes
+// both sides of every condition in a shader, so no program has a condition for another kind.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "hybrid/view/gl_objects.h"
+
+namespace hybrid {
+
+enum class Shading : std::uint8_t {
+  plain,        // lit; opaque, or with one alpha
+  tissue,       // the same, with the colour scale of displacement
+  unhiding,     // rigid, only in pixels where it hides no soft object and no tool
+  hiding,       // rigid, where its depth was drawn before: dense at the rim, thin where it faces the eye
+  glass,        // like glass
+  depth,        // depth only
+  hiding_depth  // depth only, rigid, only in the pixels that `unhiding` leaves out
+};
+inline constexpr std::size_t kShadings = 7;
+
+class ShadingPrograms {
+ public:
+  void create();
+  void release();
+  // `by_vertex`: lighting is computed at vertices and interpolated between them, which costs much less where
+  // triangles are a few pixels large and there is no graphics card.
+  [[nodiscard]] GlName of(Shading shading, bool by_vertex) const {
+    return programs_[by_vertex ? 1 : 0][static_cast<std::size_t>(shading)];
+  }
+
+ private:
+  std::array<std::array<GlName, kShadings>, 2> programs_{};
+};
+
+}  // namespace hybrid
