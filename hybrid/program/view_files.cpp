@@ -7,10 +7,10 @@
 #include <stdexcept>
 
 #include "hybrid/base/file_ending.h"
+#include "hybrid/base/png_file.h"
 #include "hybrid/base/whole_file.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/session/scene_text.h"
-#include "hybrid/view/png_file.h"
 
 namespace hybrid {
 namespace {

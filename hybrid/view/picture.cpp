@@ -10,8 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "hybrid/base/png_file.h"
 #include "hybrid/view/frame_painter.h"
-#include "hybrid/view/png_file.h"
 
 namespace hybrid {
 namespace {

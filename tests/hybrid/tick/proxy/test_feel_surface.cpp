@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "hybrid/view/png_file.h"
+#include "hybrid/base/png_file.h"
 #include "tests/hybrid/fixtures/feel_scene.h"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/program/frame_meter.h"
+#include "hybrid/window/frame_meter.h"
 
 #include <fmt/format.h>
 

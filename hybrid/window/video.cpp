@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/program/video.h"
+#include "hybrid/window/video.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

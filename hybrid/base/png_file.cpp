@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/view/png_file.h"
+#include "hybrid/base/png_file.h"
 
 #include <png.h>
 
