@@ -62,11 +62,11 @@ TEST(CubeSession, TwoSecondsAfterItsReleaseItIsAtRestAgain) {
   const hybrid::Scene scene = cube(device::DeviceModel::premium_1_5);
   auto built = hybrid::build_scene(scene);
   const auto displacement = [&built] {
-    float most = 0.0F;
-    for (const auto& axis : built.state->soft[0]->state().u) {
-      for (const float u : axis) most = std::max(most, std::abs(u));
-    }
-    return static_cast<double>(most);
+    const voxel::SoftObject& block = *built.state->soft[0];
+    double most = 0.0;
+    for (const voxel::VoxelId v : block.lattice().surface())
+      most = std::max(most, glm::length(block.displacement(v)));
+    return most;
   };
   // The path releases at 1.09 s and is out of contact by 1.15 s.
   const SessionResult pressed = hybrid::run_session(scene, built, {.seconds = 1.0, .progress = {}});
