@@ -42,9 +42,12 @@ float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std
       std::size_t n = middle + p * by[e] + q * by[f] - 2 * (by[d] + by[e] + by[f]);
       float before = 0.0F;
       for (std::size_t t = 0; t < 4; ++t, n += by[d]) {
-        const float after = across * along[d][t + 1] * is_free(n + by[d]);
-        sum += weight[n] * (after - before) * (after - before) +
-               fine.anchor_weight[d][n + by[d]] / stiffness * after;
+        // Places beyond the patch have the weight 0 and may lie outside the arrays.
+        const float own = across * along[d][t + 1];
+        const float after = own != 0.0F ? own * is_free(n + by[d]) : 0.0F;
+        if (after != 0.0F || before != 0.0F)
+          sum += weight[n] * (after - before) * (after - before) +
+                 fine.anchor_weight[d][n + by[d]] / stiffness * after;
         before = after;
       }
     }
