@@ -38,7 +38,7 @@ struct ThreadsRow {
 //                    further thread relaxes another session of the scene without a pause, and takes its
 //                    surfaces.
 //   memory           the session under `relaxation` is played again with its inputs, while a thread copies
-//                    256 MB to and fro. Each tick gets the same asynchronous results as under
+//                    256 MB between two buffers. Each tick gets the same asynchronous results as under
 //                    `relaxation`. The copying thread writes them, so another core wrote them here, too.
 //   nothing relaxed  as `memory`, but no result ever arrives: the cost of ticks that have less to do.
 // Throws SceneError.

@@ -19,7 +19,6 @@ namespace {
 constexpr int kTimedRounds = 2;        // sessions of each scene; the second round has the reverse order
 constexpr int kPathSamples = 1000;     // places at which two paths are compared
 constexpr double kSamePath_m = 1e-9;   // allows for rounding of lengths in other units
-constexpr double kDirection_N = 0.1;   // the direction of a smaller force cannot be felt
 constexpr double kSamePeriod = 1e-12;  // relative; allows for rounding of a rate
 
 std::string tool_in_words(const Tool& tool) {
@@ -98,7 +97,8 @@ void measure_scene(ComparedScene& scene, const ComparedScene& reference, double 
     const double jnd = jnd_of(f, r, floor_N);
     all.add(jnd, t_s);
     (holds ? still : moving).add(jnd, t_s);
-    if (size_N > kDirection_N && reference_N > kDirection_N) angle_deg.push_back(angle_between_deg(f, r));
+    if (size_N > kLeastDirected_N && reference_N > kLeastDirected_N)
+      angle_deg.push_back(angle_between_deg(f, r));
   }
   scene.all = all.result();
   scene.moving = moving.result();

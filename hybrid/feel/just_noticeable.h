@@ -12,8 +12,9 @@
 
 namespace hybrid {
 
-inline constexpr double kJndShare = 0.07;    // share of the reference
-inline constexpr double kJndFloor_N = 0.04;  // floor for a device without friction
+inline constexpr double kJndShare = 0.07;        // share of the reference
+inline constexpr double kJndFloor_N = 0.04;      // floor for a device without friction
+inline constexpr double kLeastDirected_N = 0.1;  // the direction of a smaller force cannot be felt
 
 // Difference between `force` (N) and `reference` (N) in just noticeable differences.
 [[nodiscard]] inline double jnd_of(const glm::dvec3& force, const glm::dvec3& reference,

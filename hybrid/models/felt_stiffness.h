@@ -13,8 +13,8 @@ namespace hybrid {
 // Just noticeable differences of the compliance, as shares. With the finger on the surface 15 %; through a
 // rigid tool more than three times as much (Bergmann Tiest & Kappers, IEEE Trans. Haptics 2(4):189, 2009).
 inline constexpr double kStiffnessJndFinger = 0.15, kStiffnessJndTool = 0.45;
-// Angle between two forces that a hand tells apart by touch alone (Barbagli, Salisbury, Ho, Spence & Tan, ACM
-// Trans. Applied Perception 3(2), 2006). With vision of the contact it is 18.4 degrees.
+// Smallest angle between two forces that a hand notices by touch alone (Barbagli, Salisbury, Ho, Spence &
+// Tan, ACM Trans. Applied Perception 3(2), 2006). With vision of the contact it is 18.4 degrees.
 inline constexpr double kDirectionJnd_deg = 25.6;
 
 // Ticks from `begin` up to, but not including, `end`.

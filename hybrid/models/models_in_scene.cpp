@@ -20,7 +20,6 @@ namespace {
 
 // Timed sessions of each variant; odd, so that a median is one of them.
 constexpr std::size_t kPasses = 3;
-constexpr double kLeastDirected_N = 0.1;  // the direction of a smaller force cannot be felt
 
 // An object of the built scene as given.
 struct GivenObject {

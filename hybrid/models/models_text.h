@@ -11,14 +11,13 @@
 
 namespace hybrid {
 
-// By which of its figures a hand tells the model from the reference, in words: "force", "direction",
-// "stiffness" (more than kStiffnessJndTool), "stiffness (finger)" (more than kStiffnessJndFinger). Empty: by
-// none.
+// Names of the figures whose error a hand feels: "force", "direction", "stiffness" (beyond
+// kStiffnessJndTool), "stiffness (finger)" (beyond kStiffnessJndFinger). Empty: a hand feels no error.
 std::vector<std::string> told_apart_by(const ModelRow& row, const ObjectModels& object);
 
 // The cheapest of the rows that a hand with a tool cannot tell from the reference, by the p99.9 of the tick.
 // Rows whose times are too near to the least one to tell count as equally cheap. Of these the scene as given
-// is taken, else the most accurate one. Empty: a hand tells all.
+// is taken, else the most accurate one. Empty: a hand tells every row from the reference.
 std::optional<std::size_t> cheapest_untold(const ObjectModels& object);
 
 // The result for one object in a few sentences, the most important one first.

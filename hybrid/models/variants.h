@@ -27,7 +27,7 @@ inline constexpr const char* kProxyVariant = "proxy";
 inline constexpr const char* kMatchedVariant = "proxy, matched";
 inline constexpr const char* kVoxelVariant = "as voxels";
 
-// The scene as it is, on an ideal device. `object`: the one whose values `words` tells.
+// The scene as it is, on an ideal device. The variant's `words` describe `object`.
 Variant as_given(const Scene& as_read, const std::vector<TunableObject>& objects, const std::string& object);
 
 // The scene's text with these values in it, and `reason` as a comment. All other text stays. Throws

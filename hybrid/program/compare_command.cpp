@@ -96,8 +96,8 @@ void write_files(const CompareCommand& command, const Scene& scene, const Compar
   });
   if (command.report.folder.empty()) return;
   outputs.attempt([&] {
-    const Page page = models_page(comparison, comparison_figure(command, scene, comparison),
-                                  title_of_comparison(scene, comparison), about);
+    const Page page = comparison_page(comparison, comparison_figure(command, scene, comparison),
+                                      title_of_comparison(scene, comparison), about);
     write_report(outputs, command.report, page, report);
   });
 }

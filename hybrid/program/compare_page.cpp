@@ -102,8 +102,8 @@ PageTable scenes_table(const ScenesComparison& comparison) {
 
 }  // namespace
 
-Page models_page(const Comparison& comparison, const Figure& figure, const std::string& title,
-                 const std::string& about) {
+Page comparison_page(const Comparison& comparison, const Figure& figure, const std::string& title,
+                     const std::string& about) {
   Page page{.title = title + ": models side by side",
             .verdict = models_verdict(comparison),
             .summary = {"The difference in JND is the one that 99 % of ticks stay below.", about,

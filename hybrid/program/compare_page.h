@@ -12,8 +12,8 @@
 namespace hybrid {
 
 // One object by several models. `about`: the scene and the motion.
-Page models_page(const Comparison& comparison, const Figure& figure, const std::string& title,
-                 const std::string& about);
+Page comparison_page(const Comparison& comparison, const Figure& figure, const std::string& title,
+                     const std::string& about);
 // Whole scenes along one motion.
 Page scenes_page(const ScenesComparison& comparison, const Figure& figure, const std::string& title);
 

@@ -278,16 +278,9 @@ void CoarseMaterial::cell_counts(int m, int z, int first_x, int nx, int first_y,
     return;
   }
   if (m >= kFirstLevel) {
-    const CubeLevel& level = levels_[index(std::min(m, kLevels - 1))];
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        const Index3 b{first_x + i, first_y + j, z};
-        out[j * nx + i] = !level.in(b)       ? 0.0F
-                          : m == kFirstLevel ? static_cast<float>(level.counts8[level.at(b)])
-                                             : static_cast<float>(level.counts[level.at(b)]);
-      }
-    }
-    return;
+    return read_cubes(m, z, first_x, nx, first_y, ny, out, [m](const CubeLevel& level, std::size_t cube) {
+      return static_cast<float>(m == kFirstLevel ? level.counts8[cube] : level.counts[cube]);
+    });
   }
   const int wide = nx * edge, high_y = ny * edge;
   cell_scratch_.resize(index(wide) * index(high_y));

@@ -148,6 +148,11 @@ class CoarseMaterial {
   void find_stiffness();
   void coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse) const;
   void add_limits();
+  // Sets out[n] of the cubes of a plane to value(level, number of the cube); 0 outside the object. Only for
+  // cubes that are stored, m >= kFirstLevel.
+  template <class Value>
+  void read_cubes(int m, int z, int first_x, int nx, int first_y, int ny, float* out,
+                  const Value& value) const;
   void mark_anchors();
   [[nodiscard]] float relative_stiffness(const Index3& p) const noexcept;
   [[nodiscard]] bool find_thin_link() const noexcept;
@@ -178,6 +183,18 @@ class CoarseMaterial {
   std::vector<PackedFace> anchor_faces_;    // sorted by cubes of level kFirstAnchorLevel
   std::vector<std::uint32_t> faces_until_;  // [cube] end of its faces in anchor_faces_
 };
+
+template <class Value>
+void CoarseMaterial::read_cubes(int m, int z, int first_x, int nx, int first_y, int ny, float* out,
+                                const Value& value) const {
+  const CubeLevel& level = levels_[composite::index(std::min(m, kLevels - 1))];
+  for (int j = 0; j < ny; ++j) {
+    for (int i = 0; i < nx; ++i) {
+      const Index3 cube{first_x + i, first_y + j, z};
+      out[j * nx + i] = level.in(cube) ? value(level, level.at(cube)) : 0.0F;
+    }
+  }
+}
 
 template <class Visit>
 void CoarseMaterial::for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const {

@@ -111,14 +111,9 @@ void CoarseMaterial::cube_stiffness(int m, int z, int first_x, int nx, int first
     return;
   }
   if (m >= kFirstLevel) {
-    const CubeLevel& level = levels_[index(std::min(m, kLevels - 1))];
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        const Index3 b{first_x + i, first_y + j, z};
-        const bool in = level.in(b);
-        const std::size_t at = in ? level.at(b) : 0;
-        for (std::size_t d = 0; d < 3; ++d) out[d][j * nx + i] = in ? level.stiffness[d][at] : 0.0F;
-      }
+    for (std::size_t d = 0; d < 3; ++d) {
+      read_cubes(m, z, first_x, nx, first_y, ny, out[d],
+                 [d](const CubeLevel& level, std::size_t cube) { return level.stiffness[d][cube]; });
     }
     return;
   }
@@ -203,13 +198,9 @@ void CoarseMaterial::voxel_limits(const Index3& p, int nx, const std::array<floa
 void CoarseMaterial::cube_limits(int m, int z, int first_x, int nx, int first_y, int ny,
                                  const std::array<float*, 3>& out) noexcept {
   if (m >= kFirstLevel) {
-    const CubeLevel& level = levels_[index(std::min(m, kLevels - 1))];
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        const Index3 b{first_x + i, first_y + j, z};
-        const bool in = level.in(b);
-        for (std::size_t q = 0; q < 3; ++q) out[q][j * nx + i] = in ? level.limits[q][level.at(b)] : 0.0F;
-      }
+    for (std::size_t q = 0; q < 3; ++q) {
+      read_cubes(m, z, first_x, nx, first_y, ny, out[q],
+                 [q](const CubeLevel& level, std::size_t cube) { return level.limits[q][cube]; });
     }
     return;
   }

@@ -327,7 +327,7 @@ TEST(Contacts, ThePathLengthIsThatOfTheWayAndNotOfTheEncodersSteps) {
   EXPECT_NEAR(hybrid::path_length_m(exact).back(), whole_m, 1e-4 * whole_m);
   EXPECT_NEAR(hybrid::path_length_m(exact)[1000], 0.5 * whole_m, 1e-4 * whole_m);
   EXPECT_NEAR(hybrid::path_length_m(reported).back(), whole_m, 0.05 * whole_m);
-  // Held still, with the last bit of the encoder going to and fro.
+  // The device is still; the last bit of its encoder alternates.
   for (std::size_t i = 0; i < reported.size(); ++i)
     reported[i].device_m = {i % 2 == 0 ? 0.0 : step_m, 0.0, i % 3 == 0 ? 0.0 : step_m};
   EXPECT_LE(hybrid::path_length_m(reported).back(), 2.0 * step_m);
