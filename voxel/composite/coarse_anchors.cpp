@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
-#include <numeric>
 
 #include "voxel/composite/coarse_material.h"
 
@@ -59,16 +58,7 @@ void CoarseMaterial::list_anchor_faces() {
     anchor_faces_ = {};
     return;
   }
-  const CubeLevel& cubes = levels_[kFirstAnchorLevel];
-  const auto cube_of = [&cubes](const PackedFace& face) {
-    return cubes.at({face.voxel[0] >> kFirstAnchorLevel, face.voxel[1] >> kFirstAnchorLevel,
-                     face.voxel[2] >> kFirstAnchorLevel});
-  };
-  std::stable_sort(anchor_faces_.begin(), anchor_faces_.end(),
-                   [&](const PackedFace& a, const PackedFace& b) { return cube_of(a) < cube_of(b); });
-  faces_until_.assign(cubes.anchored.size(), 0);
-  for (const PackedFace& face : anchor_faces_) ++faces_until_[cube_of(face)];
-  std::partial_sum(faces_until_.begin(), faces_until_.end(), faces_until_.begin());
+  sort_by_cube(anchor_faces_);
 }
 
 // Adds a quarter of a face if two things hold: the neighbour is tissue that may move, and the cell has all
@@ -95,7 +85,7 @@ void CoarseMaterial::add_anchor_face(const Index3& voxel, std::uint8_t d, std::u
     }
   }
   for (std::size_t e = 0; e < 3; ++e) face.voxel[e] = static_cast<std::uint16_t>(voxel[e]);
-  anchor_faces_.push_back(face);
+  anchor_faces_.items.push_back(face);
 }
 
 bool CoarseMaterial::anchor_near(const Index3& p, const Index3& q, int span) const noexcept {

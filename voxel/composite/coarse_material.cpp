@@ -5,8 +5,6 @@
 #include <cstdlib>
 #include <utility>
 
-#include "voxel/lattice/link_stiffness.h"
-
 namespace voxel {
 namespace {
 
@@ -14,17 +12,6 @@ using composite::index;
 
 // align_to() chooses an end if the voxel is further from the middle than size / (2 · kAlignFraction).
 constexpr int kAlignFraction = 4;
-
-// Is there a cell on any side of a link with these parallels (link_stiffness.h)?
-bool has_cell(std::uint32_t parallels) {
-  const auto there = [parallels](int p, int q) { return (parallels >> (p + 1 + 3 * (q + 1)) & 1U) != 0; };
-  for (const int p : {-1, 1}) {
-    for (const int q : {-1, 1}) {
-      if (there(p, 0) && there(0, q) && there(p, q)) return true;
-    }
-  }
-  return false;
-}
 
 }  // namespace
 
@@ -37,13 +24,11 @@ CoarseMaterial::CoarseMaterial(const Lattice& lattice) : lattice_(lattice), dims
     for (std::size_t d = 0; d < 3; ++d)
       levels_[index(m)].dims[d] = ((fills_box_ && !is_heterogeneous() ? dims_[d] - 1 : high(d)) >> m) + 1;
   }
-  if (!fills_box_) {
-    count_cells();
-    has_thin_links_ = find_thin_link();
-  }
+  if (!fills_box_) count_cells();
+  mark_anchors();
+  list_thin_links();
   if (is_heterogeneous()) find_stiffness();
   if (has_own_limits()) add_limits();
-  mark_anchors();
   list_anchor_faces();
   const std::size_t widest = index(*std::max_element(dims_.begin(), dims_.end())) + 2 * (1 << (kLevels - 1));
   voxel_scratch_.reserve(4 * widest);
@@ -138,40 +123,6 @@ bool CoarseMaterial::is_anchored(const Index3& p) const noexcept {
   return lattice_.anchored(lattice_.at(p[0] - offset_[0], p[1] - offset_[1], p[2] - offset_[2]));
 }
 
-float CoarseMaterial::relative_stiffness(const Index3& p) const noexcept {
-  const VoxelId v = lattice_.at(p[0] - offset_[0], p[1] - offset_[1], p[2] - offset_[2]);
-  return stiffness_[rank_[lattice_.label(v)]];
-}
-
-float CoarseMaterial::thin_link(const Index3& p, std::size_t d, bool all_alike) const noexcept {
-  Index3 to = p;
-  ++to[d];
-  if (!is_filled(p) || !is_filled(to)) return 0.0F;
-  std::uint32_t parallels = 0;
-  for (int q = -1; q <= 1; ++q) {
-    for (int r = -1; r <= 1; ++r) {
-      Index3 from = p;
-      from[(d + 1) % 3] += r;
-      from[(d + 2) % 3] += q;
-      Index3 end = from;
-      ++end[d];
-      if (is_filled(from) && is_filled(end)) parallels |= 1U << (r + 1 + 3 * (q + 1));
-    }
-  }
-  if (has_cell(parallels)) return 0.0F;
-  const auto weight = static_cast<float>(link_weight(parallels));
-  return all_alike ? weight : weight * std::min(relative_stiffness(p), relative_stiffness(to));
-}
-
-bool CoarseMaterial::find_thin_link() const noexcept {
-  const auto surface = lattice_.surface();
-  return std::any_of(surface.begin(), surface.end(), [this](VoxelId v) {
-    Index3 p = lattice_.coordinates(v);
-    for (std::size_t d = 0; d < 3; ++d) p[d] += offset_[d];
-    return thin_link(p, 0, true) > 0.0F || thin_link(p, 1, true) > 0.0F || thin_link(p, 2, true) > 0.0F;
-  });
-}
-
 // Stiffness ranks of a line of voxels along x; 0 where there is no voxel. Coordinates without the offset.
 void CoarseMaterial::voxel_ranks(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept {
   std::fill_n(out, nx, std::uint8_t{0});
@@ -259,6 +210,7 @@ float CoarseMaterial::cell_count(const CubeLevel& level, int m, const Index3& cu
 void CoarseMaterial::reserve_planes(std::size_t cubes) {
   const std::size_t widest = cubes << (kFirstLevel - 1);  // cells; counts of larger cubes are stored
   cell_scratch_.reserve(2 * widest * widest);
+  if (!thin_links_.items.empty()) thin_scratch_.reserve(2 * 3 * widest * widest);
 }
 
 void CoarseMaterial::cell_counts(int m, int z, int first_x, int nx, int first_y, int ny,
@@ -296,8 +248,7 @@ void CoarseMaterial::cell_counts(int m, int z, int first_x, int nx, int first_y,
 }
 
 std::size_t CoarseMaterial::memory_bytes() const {
-  std::size_t bytes = sizeof(*this) + anchor_faces_.capacity() * sizeof(PackedFace) +
-                      faces_until_.capacity() * sizeof(std::uint32_t);
+  std::size_t bytes = sizeof(*this) + anchor_faces_.memory_bytes() + thin_links_.memory_bytes();
   for (const CubeLevel& k : levels_) {
     bytes += k.counts8.capacity() + k.counts.capacity() * sizeof(std::uint32_t) + k.anchored.capacity();
     for (const auto* arrays : {&k.stiffness, &k.limits}) {

@@ -20,6 +20,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "voxel/lattice/lattice.h"
@@ -51,11 +52,6 @@ class CoarseMaterial {
     return anchored_share_[d][end];
   }
   [[nodiscard]] bool fills_box() const { return fills_box_; }
-  // Weight of the link from p to the next voxel along d if no cell is round the link: of a sheet or row of
-  // single voxels (link_stiffness.h). Otherwise 0. `all_alike`: as if all tissue had the reference stiffness.
-  [[nodiscard]] float thin_link(const Index3& p, std::size_t d, bool all_alike) const noexcept;
-  // Has the object such links?
-  [[nodiscard]] bool has_thin_links() const { return has_thin_links_; }
   // Are there tissues of different stiffness or limits?
   [[nodiscard]] bool is_heterogeneous() const { return stiffness_.size() > 2; }
   [[nodiscard]] bool has_own_limits() const { return !lattice_.uniform_limits(); }
@@ -83,6 +79,21 @@ class CoarseMaterial {
   void cube_limits(int m, int z, int first_x, int nx, int first_y, int ny,
                    const std::array<float*, 3>& out) noexcept;
 
+  // ---- tissue one voxel thick (thin_links.cpp) ----
+
+  // A link of a sheet or row of single voxels, from a voxel to the next one along d (LinkParts::thin). Its
+  // cells are softer, or there are none. `excess`: its weight beyond that of its cells, relative to the
+  // reference. `shape`: the same as if all tissue had the reference stiffness; 0 if there are cells. `share`:
+  // the excess over the number of its cells; 0 if there are none.
+  struct ThinLink {
+    Index3 voxel{};
+    std::size_t d = 0;
+    float excess = 0.0F, shape = 0.0F, share = 0.0F;
+  };
+  // Calls visit(link) for the thin links whose first voxel is in the box, cube by cube.
+  template <class Visit>
+  void for_thin_links(const Index3& low, const Index3& high, const Visit& visit) const;
+
   // ---- anchors (coarse_anchors.cpp) ----
 
   // Voxels from either end of a line to its first anchored voxel other than the end itself; 0: there is none.
@@ -98,7 +109,7 @@ class CoarseMaterial {
   [[nodiscard]] bool anchor_near(const Index3& p, const Index3& q, int span) const noexcept;
   // Does the object have scattered anchors? An anchored voxel is scattered unless it lies in a side of the
   // object's box whose voxels are all anchored.
-  [[nodiscard]] bool has_scattered_anchors() const { return !anchor_faces_.empty(); }
+  [[nodiscard]] bool has_scattered_anchors() const { return !anchor_faces_.items.empty(); }
   // A quarter of the face between an anchored voxel and its neighbour along d, which is not anchored. Each of
   // the four cells round their link has one quarter.
   struct AnchorFace {
@@ -147,6 +158,8 @@ class CoarseMaterial {
   void count_cells();
   void find_stiffness();
   void coarsen_stiffness(const CubeLevel& below, CubeLevel& coarse) const;
+  void add_thin_to_cubes(int z, int first_x, int nx, int first_y, int ny,
+                         const std::array<float*, 3>& out) noexcept;
   void add_limits();
   // Sets out[n] of the cubes of a plane to value(level, number of the cube); 0 outside the object. Only for
   // cubes that are stored, m >= kFirstLevel.
@@ -154,9 +167,13 @@ class CoarseMaterial {
   void read_cubes(int m, int z, int first_x, int nx, int first_y, int ny, float* out,
                   const Value& value) const;
   void mark_anchors();
-  [[nodiscard]] float relative_stiffness(const Index3& p) const noexcept;
-  [[nodiscard]] bool find_thin_link() const noexcept;
   void list_anchor_faces();
+  void list_thin_links();
+  void add_thin_link(const Index3& voxel, std::size_t d);
+  // Calls visit(cell, d, share) for each cell of each thin link: `share` adds to the cell's stiffness along
+  // d. Only cells in the box. Coordinates of cells include the offset.
+  template <class Visit>
+  void for_thin_cells(const Index3& low, const Index3& high, const Visit& visit) const;
   void add_anchor_face(const Index3& voxel, std::uint8_t d, std::uint8_t signs);
   [[nodiscard]] float cell_count(const CubeLevel& level, int m, const Index3& cube) const noexcept;
   void voxel_ranks(int x0, int nx, int j, int k, std::uint8_t* out) const noexcept;
@@ -167,7 +184,7 @@ class CoarseMaterial {
   const Lattice& lattice_;
   Index3 dims_, offset_{};
   std::array<std::array<double, 2>, 3> anchored_share_{};
-  bool fills_box_ = false, has_thin_links_ = false;
+  bool fills_box_ = false;
   std::array<std::uint8_t, 256> rank_{};  // [label] rank of its tissue, the softest 1; 0: no voxel
   std::vector<float> stiffness_;          // [rank] relative to the reference's
   std::vector<TissueLimits> limits_;      // [rank]; of rank 0: the reference's
@@ -180,8 +197,28 @@ class CoarseMaterial {
     std::uint8_t sides = 0;  // bit 0: side; bits 1 and 2: cell; 1 if set, else −1. Bits 3 and 4: d
     std::uint8_t rank = 0;   // of the cell's stiffness
   };
-  std::vector<PackedFace> anchor_faces_;    // sorted by cubes of level kFirstAnchorLevel
-  std::vector<std::uint32_t> faces_until_;  // [cube] end of its faces in anchor_faces_
+  struct PackedLink {
+    std::array<std::uint16_t, 3> voxel{};  // without the offset
+    std::uint8_t d = 0;
+    float excess = 0.0F, shape = 0.0F, share = 0.0F;
+  };
+  // Items that belong to voxels, sorted by cubes of level kFirstAnchorLevel.
+  template <class Item>
+  struct ByCube {
+    std::vector<Item> items;
+    std::vector<std::uint32_t> until;  // [cube] end of its items
+    [[nodiscard]] std::size_t memory_bytes() const {
+      return items.capacity() * sizeof(Item) + until.capacity() * sizeof(std::uint32_t);
+    }
+  };
+  template <class Item>
+  void sort_by_cube(ByCube<Item>& list) const;
+  // Calls visit(item, voxel) for the items whose voxel is in the box. `voxel` includes the offset.
+  template <class Item, class Visit>
+  void for_items(const ByCube<Item>& list, const Index3& low, const Index3& high, const Visit& visit) const;
+  ByCube<PackedFace> anchor_faces_;
+  ByCube<PackedLink> thin_links_;
+  std::vector<float> thin_scratch_;  // of thin links: stiffness of cells beyond that of their softest voxel
 };
 
 template <class Value>
@@ -196,9 +233,24 @@ void CoarseMaterial::read_cubes(int m, int z, int first_x, int nx, int first_y, 
   }
 }
 
-template <class Visit>
-void CoarseMaterial::for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const {
-  if (anchor_faces_.empty()) return;
+template <class Item>
+void CoarseMaterial::sort_by_cube(ByCube<Item>& list) const {
+  const CubeLevel& cubes = levels_[kFirstAnchorLevel];
+  const auto cube_of = [&cubes](const Item& item) {
+    return cubes.at({item.voxel[0] >> kFirstAnchorLevel, item.voxel[1] >> kFirstAnchorLevel,
+                     item.voxel[2] >> kFirstAnchorLevel});
+  };
+  std::stable_sort(list.items.begin(), list.items.end(),
+                   [&](const Item& a, const Item& b) { return cube_of(a) < cube_of(b); });
+  list.until.assign(cubes.anchored.size(), 0);
+  for (const Item& item : list.items) ++list.until[cube_of(item)];
+  std::partial_sum(list.until.begin(), list.until.end(), list.until.begin());
+}
+
+template <class Item, class Visit>
+void CoarseMaterial::for_items(const ByCube<Item>& list, const Index3& low, const Index3& high,
+                               const Visit& visit) const {
+  if (list.items.empty()) return;
   const CubeLevel& cubes = levels_[kFirstAnchorLevel];
   Index3 first{}, last{}, cube{};
   for (std::size_t d = 0; d < 3; ++d) {
@@ -209,21 +261,50 @@ void CoarseMaterial::for_anchor_faces(const Index3& low, const Index3& high, con
     for (cube[1] = first[1]; cube[1] <= last[1]; ++cube[1]) {
       for (cube[0] = first[0]; cube[0] <= last[0]; ++cube[0]) {
         const std::size_t at = cubes.at(cube);
-        for (std::uint32_t n = at > 0 ? faces_until_[at - 1] : 0; n < faces_until_[at]; ++n) {
-          const PackedFace& packed = anchor_faces_[n];
-          const auto sign = [&packed](int bit) { return (packed.sides >> bit & 1) != 0 ? 1 : -1; };
-          AnchorFace face{
-              {}, std::size_t{packed.sides} >> 3U, sign(0), {sign(1), sign(2)}, stiffness_[packed.rank]};
+        for (std::uint32_t n = at > 0 ? list.until[at - 1] : 0; n < list.until[at]; ++n) {
+          Index3 voxel{};
           bool inside = true;
           for (std::size_t d = 0; d < 3; ++d) {
-            face.voxel[d] = packed.voxel[d] + offset_[d];
-            inside = inside && face.voxel[d] >= low[d] && face.voxel[d] <= high[d];
+            voxel[d] = list.items[n].voxel[d] + offset_[d];
+            inside = inside && voxel[d] >= low[d] && voxel[d] <= high[d];
           }
-          if (inside) visit(face);
+          if (inside) visit(list.items[n], voxel);
         }
       }
     }
   }
+}
+
+template <class Visit>
+void CoarseMaterial::for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const {
+  for_items(anchor_faces_, low, high, [&](const PackedFace& packed, const Index3& voxel) {
+    const auto sign = [&packed](int bit) { return (packed.sides >> bit & 1) != 0 ? 1 : -1; };
+    visit(AnchorFace{
+        voxel, std::size_t{packed.sides} >> 3U, sign(0), {sign(1), sign(2)}, stiffness_[packed.rank]});
+  });
+}
+
+template <class Visit>
+void CoarseMaterial::for_thin_links(const Index3& low, const Index3& high, const Visit& visit) const {
+  for_items(thin_links_, low, high, [&](const PackedLink& packed, const Index3& voxel) {
+    visit(ThinLink{voxel, packed.d, packed.excess, packed.shape, packed.share});
+  });
+}
+
+template <class Visit>
+void CoarseMaterial::for_thin_cells(const Index3& low, const Index3& high, const Visit& visit) const {
+  const Index3 beyond{high[0] + 1, high[1] + 1, high[2] + 1};
+  for_thin_links(low, beyond, [&](const ThinLink& link) {
+    const std::size_t e = (link.d + 1) % 3, f = (link.d + 2) % 3;
+    for (int n = 0; link.share > 0.0F && n < 4; ++n) {
+      Index3 cell = link.voxel;
+      cell[e] -= n & 1;
+      cell[f] -= n >> 1;
+      bool inside = true;
+      for (std::size_t d = 0; d < 3; ++d) inside = inside && cell[d] >= low[d] && cell[d] <= high[d];
+      if (inside) visit(cell, link.d, link.share);
+    }
+  });
 }
 
 }  // namespace voxel

@@ -30,8 +30,14 @@ void CoarseMaterial::find_stiffness() {
   std::vector<Column> along_y(index(nx)), along_z(area);
   std::vector<float> compliance;
   for (const float s : stiffness_) compliance.push_back(s > 0.0F ? 1.0F / s : 0.0F);
+  std::array<std::vector<float>, 3> thin;  // [d] by cell of the layer
+  for (auto& axis : thin) axis.resize(thin_links_.items.empty() ? 0 : area);
   for (int k = 0; k < fine.dims[2] * kEdge; ++k) {
     cell_ranks(k, 0, nx, 0, ny, cells.data());
+    for (auto& axis : thin) std::fill(axis.begin(), axis.end(), 0.0F);
+    for_thin_cells({0, 0, k}, {nx - 1, ny - 1, k}, [&](const Index3& cell, std::size_t d, float share) {
+      thin[d][index(cell[1]) * index(nx) + index(cell[0])] += share;
+    });
     for (int j = 0; j < ny; ++j) {
       const std::size_t row = fine.at({0, j / kEdge, k / kEdge});
       const std::uint8_t* ranks = cells.data() + index(j) * index(nx);
@@ -39,10 +45,13 @@ void CoarseMaterial::find_stiffness() {
       for (int i = 0; i < nx; ++i) {
         const std::size_t cube = row + index(i / kEdge);
         const std::uint8_t rank = ranks[i];
-        Column *const y = &along_y[index(i)], *const z = &along_z[index(j) * index(nx) + index(i)];
-        for (Column* const c : {&along_x, y, z}) {
-          c->cells += rank != 0 ? 1.0F : 0.0F;
-          c->compliance += compliance[rank];
+        const std::size_t cell = index(j) * index(nx) + index(i);
+        Column *const y = &along_y[index(i)], *const z = &along_z[cell];
+        const std::array<Column*, 3> columns{&along_x, y, z};
+        for (std::size_t d = 0; rank != 0 && d < 3; ++d) {
+          columns[d]->cells += 1.0F;
+          const float more = thin[d].empty() ? 0.0F : thin[d][cell];
+          columns[d]->compliance += more > 0.0F ? 1.0F / (stiffness_[rank] + more) : compliance[rank];
         }
         const auto end = [&](int at, std::size_t d, Column& c) {
           if (at % kEdge != kEdge - 1) return;
@@ -108,6 +117,11 @@ void CoarseMaterial::cube_stiffness(int m, int z, int first_x, int nx, int first
   if (m == 0) {
     cell_stiffness(z, first_x, nx, first_y, ny, out[0]);
     for (std::size_t d = 1; d < 3; ++d) std::copy_n(out[0], area, out[d]);
+    for_thin_cells({first_x, first_y, z}, {first_x + nx - 1, first_y + ny - 1, z},
+                   [&](const Index3& cell, std::size_t d, float share) {
+                     float& at = out[d][index(cell[1] - first_y) * index(nx) + index(cell[0] - first_x)];
+                     if (at > 0.0F) at += share;
+                   });
     return;
   }
   if (m >= kFirstLevel) {
@@ -147,6 +161,42 @@ void CoarseMaterial::cube_stiffness(int m, int z, int first_x, int nx, int first
       }
     }
   }
+  add_thin_to_cubes(z, first_x, nx, first_y, ny, out);
+}
+
+// Weighs cubes of eight cells again that have thin links. cell_scratch_ still has the ranks of their cells.
+void CoarseMaterial::add_thin_to_cubes(int z, int first_x, int nx, int first_y, int ny,
+                                       const std::array<float*, 3>& out) noexcept {
+  if (thin_links_.items.empty()) return;
+  const int wide = 2 * nx;
+  const std::size_t layer_of = index(wide) * index(2 * ny);
+  thin_scratch_.assign(6 * layer_of, 0.0F);
+  const auto number = [&](const Index3& cell) {
+    return index(cell[2] - 2 * z) * layer_of + index(cell[1] - 2 * first_y) * index(wide) +
+           index(cell[0] - 2 * first_x);
+  };
+  const Index3 low{2 * first_x, 2 * first_y, 2 * z}, high{low[0] + wide - 1, low[1] + 2 * ny - 1, low[2] + 1};
+  for_thin_cells(low, high, [&](const Index3& cell, std::size_t d, float share) {
+    thin_scratch_[d * 2 * layer_of + number(cell)] += share;
+  });
+  for_thin_cells(low, high, [&](const Index3& cell, std::size_t d, float /*share*/) {
+    const Index3 first{cell[0] & ~1, cell[1] & ~1, cell[2] & ~1};
+    float sum = 0.0F;
+    for (int column = 0; column < 4; ++column) {
+      Index3 at = first;
+      at[(d + 1) % 3] += column & 1;
+      at[(d + 2) % 3] += column >> 1;
+      float cells = 0.0F, compliance = 0.0F;
+      for (int half = 0; half < 2; ++half, ++at[d]) {
+        const std::size_t n = number(at);
+        if (cell_scratch_[n] == 0) continue;
+        cells += 1.0F;
+        compliance += 1.0F / (stiffness_[cell_scratch_[n]] + thin_scratch_[d * 2 * layer_of + n]);
+      }
+      if (cells > 0.0F) sum += cells * cells / compliance;
+    }
+    out[d][index((cell[1] >> 1) - first_y) * index(nx) + index((cell[0] >> 1) - first_x)] = sum;
+  });
 }
 
 // Adds up the limits of the cells in each stored cube.

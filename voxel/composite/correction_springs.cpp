@@ -9,45 +9,70 @@ namespace {
 
 using composite::index;
 
-// A node needs no spring on an axis if its two links there have at least this share of the weight of two full
-// links. In tissue without gaps the coarse node's links are stiffer than the fine level: the fine level's
-// stiffness against a prolonged correction is only 9/16 of that of the node's own links.
-constexpr float kRegular = 0.999F;
+constexpr std::array<std::size_t, 3> kToNext{1, 5, 25};  // from a NodeWeights entry to the next one along d
 
 }  // namespace
 
-// Stiffness along d with which the links of the fine level resist a correction of one coarse node, once it is
-// prolonged. A link counts by the squared difference of the interpolation weights at its ends, an anchor by
-// the interpolation weight of its node.
-float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std::size_t d,
-                                      float stiffness) const noexcept {
-  std::array<std::array<float, 5>, 3> along{};  // interpolation weights at −2 … 2 fine nodes
-  std::array<std::size_t, 3> by{};
-  for (std::size_t e = 0; e < 3; ++e) {
-    const auto c = index(node[e]);
-    along[e] = {0.0F, fine.nodes[e].restrict_low[c], fine.nodes[e].restrict_own[c],
-                fine.nodes[e].restrict_high[c], 0.0F};
-    by[e] = fine.stride_along(e);
+// Where tissues differ, weights between two coarse nodes follow from links, one axis after the other
+// (operator_interpolation.cpp).
+CompositeGrid::NodeWeights CompositeGrid::weights_of_node(const Level& fine,
+                                                          const Index3& node) const noexcept {
+  std::array<std::array<float, 3>, 3> share{};  // along each axis at −1, 0, 1, without regard to tissues
+  Index3 middle{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto c = index(node[d]);
+    share[d] = {fine.nodes[d].restrict_low[c], fine.nodes[d].restrict_own[c], fine.nodes[d].restrict_high[c]};
+    middle[d] = fine.nodes[d].fine[c];
   }
+  // Share of the coarse node along d at a fine node that lies on its side `t` (−1, 0, 1).
+  const auto along = [&](std::size_t d, int t, std::size_t n) {
+    const float plain = share[d][index(t + 1)];
+    if (t == 0 || plain != 0.5F || !material_.is_heterogeneous()) return plain;
+    const auto& weight = fine.weight[d];
+    const float before = weight[n - fine.stride_along(d)], after = weight[n];
+    if (before == 0.0F || after == 0.0F) return plain;
+    return (t < 0 ? after : before) / (before + after);
+  };
+  const std::size_t at = fine.node(middle[0], middle[1], middle[2]);
+  NodeWeights weights{};
+  for (int i = -1; i <= 1; ++i) {
+    if (share[0][index(i + 1)] == 0.0F) continue;
+    const std::size_t of_x = at + index(i + 1) - 1;
+    const float x = along(0, i, of_x);
+    for (int j = -1; j <= 1; ++j) {
+      if (share[1][index(j + 1)] == 0.0F) continue;
+      const std::size_t of_y = of_x + index(j + 1) * fine.stride - fine.stride;
+      const float xy = x * along(1, j, of_y);
+      for (int k = -1; k <= 1; ++k) {
+        if (share[2][index(k + 1)] == 0.0F) continue;
+        const std::size_t of_z = of_y + index(k + 1) * fine.plane - fine.plane;
+        weights[index(i + 2 + 5 * (j + 2) + 25 * (k + 2))] = xy * along(2, k, of_z);
+      }
+    }
+  }
+  return weights;
+}
+
+// Stiffness along d with which the fine level resists a correction of one coarse node, once it is prolonged.
+// A link counts by the squared difference of the interpolation weights at its ends, an anchor by the
+// interpolation weight of its node. middle: the fine node at the coarse node's place.
+float CompositeGrid::prolonged_weight(const Level& fine, std::size_t middle, std::size_t d,
+                                      const NodeWeights& of_node) noexcept {
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
-  const std::size_t middle = fine.node(fine.nodes[0].fine[index(node[0])], fine.nodes[1].fine[index(node[1])],
-                                       fine.nodes[2].fine[index(node[2])]);
-  const auto& weight = shape_weights(fine)[d];
-  const auto is_free = [&](std::size_t n) { return fine.inverse_diagonal[0][n] != 0.0F ? 1.0F : 0.0F; };
+  const std::array<std::size_t, 3> by{1, fine.stride, fine.plane};
   float sum = 0.0F;
   for (std::size_t q = 1; q <= 3; ++q) {
     for (std::size_t p = 1; p <= 3; ++p) {
-      const float across = along[e][p] * along[f][q];
-      if (across == 0.0F) continue;
+      std::size_t own = p * kToNext[e] + q * kToNext[f];
       std::size_t n = middle + p * by[e] + q * by[f] - 2 * (by[d] + by[e] + by[f]);
       float before = 0.0F;
       for (std::size_t t = 0; t < 4; ++t, n += by[d]) {
+        own += kToNext[d];
         // Places beyond the patch have the weight 0 and may lie outside the arrays.
-        const float own = across * along[d][t + 1];
-        const float after = own != 0.0F ? own * is_free(n + by[d]) : 0.0F;
-        if (after != 0.0F || before != 0.0F)
-          sum += weight[n] * (after - before) * (after - before) +
-                 fine.anchor_weight[d][n + by[d]] / stiffness * after;
+        const bool is_free = of_node[own] != 0.0F && fine.inverse_diagonal[0][n + by[d]] != 0.0F;
+        const float after = is_free ? of_node[own] : 0.0F;
+        if (after != 0.0F || before != 0.0F) sum += fine.weight[d][n] * (after - before) * (after - before);
+        if (after != 0.0F) sum += fine.anchor_weight[d][n + by[d]] * after;
         before = after;
       }
     }
@@ -57,29 +82,27 @@ float CompositeGrid::prolonged_weight(const Level& fine, const Index3& node, std
 
 // A coarse level is a discretisation of its own. Its links may be weaker than the fine level's stiffness
 // against a prolonged correction: at a node that barely touches the tissue, at links across a gap, at
-// anchors. A correction would then go too far. There a spring holds the node at its present displacement; its
-// stiffness is the difference. The spring does not change the solution.
+// anchors, beside thin stiff tissue. A correction would then go too far. There a spring holds the node at its
+// present displacement; its stiffness is the difference. The spring does not change the solution.
 void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) const noexcept {
   coarse.correction_springs.clear();
-  if (material_.fills_box() && !material_.has_scattered_anchors()) return;
+  if (material_.fills_box() && !material_.is_heterogeneous() && !material_.has_scattered_anchors()) return;
   const auto& nodes = fine.nodes;
   for (int k = nodes[2].coarse_first; k <= nodes[2].coarse_last; ++k) {
     for (int j = nodes[1].coarse_first; j <= nodes[1].coarse_last; ++j) {
       for (int i = nodes[0].coarse_first; i <= nodes[0].coarse_last; ++i) {
         const std::size_t n = coarse.node(i, j, k);
         if (coarse.inverse_diagonal[0][n] == 0.0F) continue;
+        const std::size_t middle =
+            fine.node(nodes[0].fine[index(i)], nodes[1].fine[index(j)], nodes[2].fine[index(k)]);
+        const NodeWeights of_node = weights_of_node(fine, {i, j, k});
         CorrectionSpring spring{static_cast<std::uint32_t>(n), {}};
         bool any = false;
-        // Links are compared by their tissue's shape, anchors by their weight over the tissue's stiffness.
-        const float stiffness = stiffness_at(coarse, n);
-        if (stiffness == 0.0F) continue;  // anchors alone hold the node
         for (std::size_t d = 0; d < 3; ++d) {
-          const auto& weight = shape_weights(coarse)[d];
-          const float own =
-              weight[n] + weight[n - coarse.stride_along(d)] + coarse.anchor_weight[d][n] / stiffness;
-          if (own >= kRegular * static_cast<float>(2 * coarse.step)) continue;
-          spring.weight[d] =
-              stiffness * std::max(prolonged_weight(fine, {i, j, k}, d, stiffness) - own, 0.0F);
+          const auto& weight = coarse.weight[d];
+
+          const float own = weight[n] + weight[n - coarse.stride_along(d)] + coarse.anchor_weight[d][n];
+          spring.weight[d] = std::max(prolonged_weight(fine, middle, d, of_node) - own, 0.0F);
           any = any || spring.weight[d] > 0.0F;
         }
         if (any && coarse.correction_springs.size() < coarse.correction_springs.capacity())

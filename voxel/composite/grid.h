@@ -274,8 +274,12 @@ class CompositeGrid {
   void find_ghosts(Level& level, bool near) noexcept;
   void set_up_transfer(Level& fine, Level& coarse) const noexcept;
   void find_correction_springs(const Level& fine, Level& coarse) const noexcept;
-  [[nodiscard]] float prolonged_weight(const Level& fine, const Index3& node, std::size_t d,
-                                       float stiffness) const noexcept;
+  // Interpolation weights of a coarse node at the fine nodes round it: the fine node at offset (i, j, k),
+  // each −2 … 2, has number (i + 2) + 5 (j + 2) + 25 (k + 2). Those at ±2 are 0.
+  using NodeWeights = std::array<float, 125>;
+  [[nodiscard]] NodeWeights weights_of_node(const Level& fine, const Index3& node) const noexcept;
+  [[nodiscard]] static float prolonged_weight(const Level& fine, std::size_t middle, std::size_t d,
+                                              const NodeWeights& of_node) noexcept;
   void fill_ghosts(const Level& level, float* values) const noexcept;
   void distribute_ghost_loads(const Level& level, float* loads) const noexcept;
   // ---- patch_stiffness.cpp ----

@@ -89,10 +89,14 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
     }
     // A bound that has fallen by more than fall_m lies below all displacements, so it holds no node.
     const float fall_m = strongest + std::max(std::abs(strongest), largest_displacement(a));
+    NodeBox finer_reach;
     for (std::size_t l = 0; l < levels_.size(); ++l) {
       const NodeBox reach = reach_of_bounds(levels_[l], a, kind, pressed, fall_m);
+      if (l > 0) hand_on_bounds(l - 1, kind, finer_reach);
       propagate_bounds(levels_[l], a, kind, reach);
-      if (l + 1 < levels_.size()) hand_on_bounds(l, kind, reach);
+      // A coarse level may have links across gaps that the finer level does not have.
+      if (l > 0) hand_on_bounds(l - 1, kind, finer_reach);
+      finer_reach = reach;
     }
   }
 }

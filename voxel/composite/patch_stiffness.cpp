@@ -78,24 +78,20 @@ void CompositeGrid::weigh_cells(const Level& level, std::array<Floats, 3>& weigh
   }
 }
 
-// Adds the links of sheets and rows of single voxels. Coarse levels have no such links: on them thin tissue
-// moves with the tissue beside it.
+// Adds the links of sheets and rows of single voxels.
 void CompositeGrid::weigh_thin_links(const Level& level, std::array<Floats, 3>& weight,
                                      bool all_alike) const noexcept {
-  if (!material_.has_thin_links()) return;
   const auto& nodes = level.nodes;
-  for (int k = 0; k < nodes[2].count; ++k) {
-    for (int j = 0; j < nodes[1].count; ++j) {
-      for (int i = 0; i < nodes[0].count; ++i) {
-        const Index3 node{i, j, k}, p{level.at(0, i), level.at(1, j), level.at(2, k)};
-        const std::size_t n = level.node(i, j, k);
-        for (std::size_t d = 0; d < 3; ++d) {
-          if (weight[d][n] == 0.0F && node[d] + 1 < nodes[d].count)
-            weight[d][n] = material_.thin_link(p, d, all_alike);
-        }
-      }
-    }
+  Index3 low{}, high{};
+  for (std::size_t d = 0; d < 3; ++d) {
+    low[d] = nodes[d].begin;
+    high[d] = level.at(d, nodes[d].count - 1);
   }
+  material_.for_thin_links(low, high, [&](const CoarseMaterial::ThinLink& link) {
+    if (link.voxel[link.d] == high[link.d]) return;
+    weight[link.d][level.node(link.voxel[0] - low[0], link.voxel[1] - low[1], link.voxel[2] - low[2])] +=
+        all_alike ? link.shape : link.excess;
+  });
 }
 
 // Level m of the half cells: cubes of which two lie along a link.

@@ -25,9 +25,8 @@ constexpr double kMaxForceError = 0.14;
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
 constexpr double kMaxThinShare = 0.02;  // of the stiffness of links at surfaces and where tissues meet
 
-// Share of the links' stiffness that belongs to tissue only one voxel thick (LinkParts::thin), at surfaces
-// and where tissues meet. A cell is as stiff as the softest of its eight voxels, so such tissue has no cell
-// of its own stiffness. Coarse levels know cells only. Looks at kRowsTried rows at most.
+// Share of the links' stiffness at surfaces and where tissues meet that belongs to links without a cell: of
+// sheets and rows of single voxels in air. Coarse levels know cells only. Looks at kRowsTried rows at most.
 double thin_tissue_share(const Lattice& lattice) {
   constexpr RowId kRowsTried = 20000;
   const Grid& g = lattice.grid();
@@ -58,7 +57,7 @@ double thin_tissue_share(const Lattice& lattice) {
           links[index(n)] = softer(moduli_at(from), moduli_at(to));
         }
         const LinkParts parts = link_parts(links);
-        thin += parts.thin.along_Pa;
+        if (parts.cells.along_Pa == 0.0) thin += parts.thin.along_Pa;
         all += parts.thin.along_Pa + parts.cells.along_Pa;
       }
     }
@@ -94,7 +93,7 @@ CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
     const LinkLimit& l = lattice.tightest(d);
     if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return {"its links have no slack"};
   }
-  if (thin_tissue_share(lattice) > kMaxThinShare) return {"much of it is one voxel thick"};
+  if (thin_tissue_share(lattice) > kMaxThinShare) return {"much of it is one voxel thick, in air"};
   return CompositeGrid(lattice, kTrialHalfWidth).try_contacts();
 }
 

@@ -79,6 +79,22 @@ TEST(CompositeGrid, HolesAndNotchesAreInTheLinks) {
   EXPECT_LT(d.force, 0.02);
 }
 
+// Coarse levels have links across a narrow gap. Chains must not cross it.
+TEST(CompositeGrid, ChainsGoRoundNarrowGaps) {
+  const Index3 dims{19, 17, 19};
+  for (const int wide : {1, 3}) {
+    const auto notched = [wide](const Index3& p) { return p[2] < 8 || p[0] < 12 || p[0] >= 12 + wide; };
+    const Body body(dims, 0.1, notched, below);
+    Difference d = compare(body, {{8, 8, 18}, 2, 0.8 * kSpacing}, CompositeGrid::kRefineAll);
+    EXPECT_LT(d.displacement, 1e-4);
+    EXPECT_LT(d.force, 1e-4);
+    // At the ends of the gap some links exceed their limits. The grid's bounds do not prevent this.
+    d = compare(body, {{8, 8, 18}, 2, 1.4 * kSpacing}, CompositeGrid::kRefineAll);
+    EXPECT_LT(d.displacement, 0.06);
+    EXPECT_LT(d.force, 0.03);
+  }
+}
+
 // A plate of single voxels joins two blocks.
 TEST(CompositeGrid, SheetsOfSingleVoxelsAreInTheLinks) {
   const auto joined = [](const Index3& p) { return p[2] < 4 || p[2] > 8 || p[0] == 7; };
@@ -101,7 +117,7 @@ TEST(CompositeGrid, PatchesInOtherShapes) {
   const auto sides = [](const Index3& p) { return p[0] == 0 || p[0] == 59 || p[1] == 0 || p[1] == 59; };
   EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, sides), patch), 0.05);
   const auto notched = [](const Index3& p) { return p[2] < 40 || p[0] < 42 || p[0] > 46; };
-  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, notched, below), patch), 0.05);
+  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, notched, below), patch), 0.08);
   const auto hollow = [](const Index3& p) { return std::hypot(p[0] - 30.0, p[2] - 22.0) > 9.0; };
   EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, hollow, below), patch), 0.07);
 }
@@ -209,7 +225,7 @@ TEST(CompositeGrid, SaysWhyAnObjectIsUnsuitable) {
   const auto reason = [](const Body& body) { return CompositeGrid::suitability(*body.lattice).reason; };
   EXPECT_EQ(reason(Body(dims, 0.1, everywhere, below)), "");
   const auto fins = [](const Index3& p) { return p[2] < 20 || p[0] % 4 == 0; };
-  EXPECT_EQ(reason(Body(dims, 0.1, fins, below)), "much of it is one voxel thick");
+  EXPECT_EQ(reason(Body(dims, 0.1, fins, below)), "much of it is one voxel thick, in air");
   const auto specks = [](const Index3& p) { return p[0] % 8 == 4 && p[1] % 8 == 4 && p[2] == 20; };
   EXPECT_EQ(reason(Body(dims, 0.1, everywhere, specks)), "");
   const auto lump = [](const Index3& p) { return p[0] > 10 && p[0] < 30 && p[1] > 10 && p[2] < 10; };
@@ -228,7 +244,7 @@ TEST(CompositeGrid, SaysWhyAnObjectIsUnsuitable) {
   stiff.poisson = 0.4;
   EXPECT_NE(reason_with(stiff), "");
   const auto skin = [](const Index3& p) { return p[2] == 39 ? 20 : 1; };
-  EXPECT_NE(reason(Body(dims, 0.1, everywhere, below, skin)), "");
+  EXPECT_EQ(reason(Body(dims, 0.1, everywhere, below, skin)), "");
 }
 
 }  // namespace

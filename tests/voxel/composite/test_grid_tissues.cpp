@@ -93,6 +93,47 @@ TEST(CompositeGrid, TissuesWithLimitsOfTheirOwnAreTheLatticeAtEquilibrium) {
   }
 }
 
+// Stiff tissue one voxel thick within soft tissue: a skin, a membrane, walls that cross, straight and oblique
+// rows.
+int skin_of_30(const Index3& p) {
+  return p[2] == 12 ? 30 : 1;
+}
+int membrane_of_30(const Index3& p) {
+  return p[2] == 7 ? 30 : 1;
+}
+int walls_of_30(const Index3& p) {
+  return p[0] % 4 == 1 || p[1] % 5 == 2 ? 30 : 1;
+}
+int rows_of_100(const Index3& p) {
+  return (p[1] % 4 == 2 && p[2] % 4 == 1) || (p[1] == 4 && p[2] == p[0]) ? 100 : 1;
+}
+
+TEST(CompositeGrid, TissueOneVoxelThickIsTheLatticeAtEquilibrium) {
+  const Index3 dims{13, 13, 13};
+  for (const auto& tissue : {skin_of_30, membrane_of_30, walls_of_30, rows_of_100}) {
+    for (const double depth : {0.1, 0.5}) {
+      const Body body(dims, 0.15, everywhere, below, tissue);
+      const PressedSquare patch{{6, 6, 12}, 2, depth * 0.15 * 12 * kSpacing};
+      const Difference d = compare(body, patch, CompositeGrid::kRefineAll);
+      EXPECT_LT(d.displacement, 0.01);
+      EXPECT_LT(d.force, 0.01);
+    }
+  }
+}
+
+TEST(CompositeGrid, PatchesInTissueOneVoxelThick) {
+  const int n = 64;
+  const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
+  const auto skin = [](const Index3& p) { return p[2] == 63 ? 30 : 1; };
+  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, skin), patch), 0.05);
+  const auto membrane = [](const Index3& p) { return p[2] == 50 ? 30 : 1; };
+  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, membrane), patch), 0.05);
+  const auto walls = [](const Index3& p) { return p[0] % 12 == 5 || p[1] % 10 == 3 ? 20 : 1; };
+  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, walls), patch), 0.05);
+  const auto rows = [](const Index3& p) { return p[1] % 8 == 2 && p[2] % 8 == 5 ? 50 : 1; };
+  EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, rows), patch), 0.05);
+}
+
 TEST(CompositeGrid, PatchesInSeveralTissues) {
   const int n = 64;
   const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};
