@@ -344,6 +344,9 @@ class CompositeGrid {
   void update_multipliers(std::size_t axis) noexcept;
   void drop_multipliers_at_sides(Level& level, std::size_t axis) noexcept;
   float update_anchor_multipliers(Level& level, std::size_t axis, std::size_t d) noexcept;
+  template <class Visit>
+  void for_anchor_ratios(const Level& level, std::size_t axis, std::size_t d, const Visit& visit) const;
+  [[nodiscard]] float largest_anchor_ratio(const Level& level, std::size_t axis, std::size_t d) const;
   void restrict_multipliers(std::size_t l, std::size_t axis) noexcept;
   void update_diagonal(Level& level, std::size_t axis) const noexcept;
   void release_multipliers() noexcept;

@@ -52,6 +52,7 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
         most = std::max(most, composite::largest_limit_ratio(
                                   level.u[a].data() + from, level.weight[d].data() + from,
                                   level.stride_along(d), link_multiplier(level, a, d), level.floats()));
+        most = std::max(most, largest_anchor_ratio(level, a, d));
       }
     }
     if (most <= 1.0F + kTolerance) return;
@@ -116,24 +117,41 @@ void CompositeGrid::drop_multipliers_at_sides(Level& level, std::size_t a) noexc
 // Returns the largest limited / weight, >= 1.
 float CompositeGrid::update_anchor_multipliers(Level& level, std::size_t a, std::size_t d) noexcept {
   float most = 1.0F;
-  if (!level.has_anchors) return most;
-  const std::size_t from = level.first_row(), end = from + level.floats();
   const composite::LinkMultiplier links = link_multiplier(level, a, d);
+  const auto& weight = level.anchor_weight[d];
+  auto& limited = level.limited_anchor_weight[a][d];
+  for_anchor_ratios(level, a, d, [&](std::size_t n, float ratio) {
+    limited[n] = composite::updated_weight(limited[n], weight[n], ratio, links);
+    most = std::max(most, limited[n] / weight[n]);
+  });
+  return most;
+}
+
+// Calls visit(node, ratio) for the nodes with an anchor along d. Ratio: extension of the chain to the anchor
+// over its limit.
+template <class Visit>
+void CompositeGrid::for_anchor_ratios(const Level& level, std::size_t a, std::size_t d,
+                                      const Visit& visit) const {
+  if (!level.has_anchors) return;
+  const std::size_t from = level.first_row(), end = from + level.floats();
+  const composite::LimitOfLinks longest = limit_of_links(level, a, d, 1),
+                                shortest = limit_of_links(level, a, d, 0);
   const float *const weight = level.anchor_weight[d].data(), *const distance =
                                                                  level.anchor_distance[d].data();
   const float* const u = level.u[a].data();
-  float* const limited = level.limited_anchor_weight[a][d].data();
   for (std::size_t n = from; n < end; ++n) {
     if (weight[n] == 0.0F) continue;
-    // The link's extension is −u if the anchor is ahead, u if it is behind.
-    const float longer = -u[n] / distance[n];
-    // `links` are as long as the level's step, the chain to the anchor `distance` voxels.
-    const float limit_ratio =
-        static_cast<float>(level.step) * std::max(longer / composite::limit_at(links.longer, n - from, 0),
-                                                  -longer / composite::limit_at(links.shorter, n - from, 0));
-    limited[n] = composite::updated_weight(limited[n], weight[n], limit_ratio, links);
-    most = std::max(most, limited[n] / weight[n]);
+    // The chain's extension is −u if the anchor is ahead, u if it is behind. Limits are those of a link as
+    // long as the level's step, the chain is `distance` voxels long.
+    const float longer = -u[n] * static_cast<float>(level.step) / distance[n];
+    visit(n, std::max(longer / composite::limit_at(longest, n - from, 0),
+                      -longer / composite::limit_at(shortest, n - from, 0)));
   }
+}
+
+float CompositeGrid::largest_anchor_ratio(const Level& level, std::size_t a, std::size_t d) const {
+  float most = 0.0F;
+  for_anchor_ratios(level, a, d, [&](std::size_t, float ratio) { most = std::max(most, ratio); });
   return most;
 }
 
