@@ -260,6 +260,16 @@ TEST_F(VolumeHeaders, VoxelSizesOfMetaImage) {
   EXPECT_EQ(notes_of(in_folder("v.mha")), "");
 }
 
+TEST_F(VolumeHeaders, AMetaImageWithoutSizesOrTypeIsRefused) {
+  for (const char* field : {"DimSize = 12 10 8\n", "ElementType = MET_UCHAR\n"}) {
+    std::string text = tests::meta_file("");
+    text.erase(text.find(field), std::strlen(field));
+    EXPECT_SAYS(refusal_of(write("v.mha", text)), "before ElementDataFile");
+    text.insert(text.find("LOCAL\n") + 6, field);  // after the last field of the header
+    EXPECT_SAYS(refusal_of(write("v.mha", text)), "before ElementDataFile");
+  }
+}
+
 // ---- NIfTI: codes and scaling
 
 TEST_F(VolumeHeaders, NiftiWithoutQformAndSformIsSaid) {
