@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdint>
 #include <system_error>
 #include <utility>
 
@@ -33,6 +34,33 @@ constexpr std::array<OtherFormat, 7> kOtherFormats{
      {"PK\x03\x04"sv, "is a ZIP file or a workbook (.xlsx, .ods); export its table as CSV"sv},
      {"\xD0\xCF\x11\xE0"sv, "is a workbook (.xls); export its table as CSV"sv},
      {"version https://git-lfs"sv, "is a Git LFS pointer; fetch the file itself (git lfs pull)"sv}}};
+
+// The length in bytes of the character of UTF-8 (RFC 3629) at `at`. 0: the bytes there are none, or one that
+// may not be printed as it is: a control character, a separator of lines, or a mark that turns the direction
+// of text.
+std::size_t printable_at(std::string_view text, std::size_t at) {
+  constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};  // [length] code point
+  const auto byte = [&](std::size_t i) -> std::uint32_t { return static_cast<unsigned char>(text[at + i]); };
+  const std::uint32_t lead = byte(0);
+  const std::size_t length = lead < 0x80   ? 1
+                             : lead < 0xC0 ? 0
+                             : lead < 0xE0 ? 2
+                             : lead < 0xF0 ? 3
+                             : lead < 0xF8 ? 4
+                                           : 0;
+  if (length == 0 || length > text.size() - at) return 0;
+  std::uint32_t code = length == 1 ? lead : lead & (0x7FU >> length);
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0U) != 0x80U) return 0;
+    code = code << 6U | (byte(i) & 0x3FU);
+  }
+  const auto within = [code](std::uint32_t first, std::uint32_t last) {
+    return first <= code && code <= last;
+  };
+  const bool none = code < kLeast[length] || code > 0x10FFFF || within(0xD800, 0xDFFF);
+  const bool hidden = code < 0x20 || within(0x7F, 0x9F) || within(0x2028, 0x202E) || within(0x2066, 0x2069);
+  return none || hidden ? 0 : length;
+}
 
 gzFile zlib(void* stream) {
   return static_cast<gzFile>(stream);
@@ -153,11 +181,14 @@ std::string lower_ascii(std::string_view text) {
 }
 
 std::string shown(std::string_view text) {
-  std::string out(text.substr(0, 40));
-  for (char& c : out) {
-    if (c < ' ' || c > '~') c = '?';
+  constexpr std::size_t kMost = 40;  // characters
+  std::string out = "'";
+  for (std::size_t at = 0, count = 0; at < text.size() && count < kMost; ++count) {
+    const std::size_t length = printable_at(text, at);
+    out += length > 0 ? text.substr(at, length) : "?"sv;
+    at += std::max<std::size_t>(length, 1);
   }
-  return "'" + out + "'";
+  return out + "'";
 }
 
 std::string short_number(double value) {

@@ -51,7 +51,8 @@ class LineReader {
 std::string_view without_blanks(std::string_view text);
 // Turns ASCII letters, and only these, into lower case: the same in every locale.
 std::string lower_ascii(std::string_view text);
-// At most 40 characters in quotation marks, for a message. A byte outside ASCII is shown as '?'.
+// At most 40 characters in quotation marks, for a message. Control characters, and bytes that are not UTF-8,
+// are shown as '?'.
 std::string shown(std::string_view text);
 // The number with four significant digits, for messages. The decimal mark is a point in every locale.
 std::string short_number(double value);

@@ -22,6 +22,14 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
+// The length in bytes of the minus at `at`, a hyphen or the minus sign of Unicode; 0: there is none.
+std::size_t minus_at(std::string_view field, std::size_t at) {
+  for (const std::string_view minus : {"-"sv, "\xE2\x88\x92"sv}) {
+    if (field.substr(at).starts_with(minus)) return minus.size();
+  }
+  return 0;
+}
+
 // The length in bytes of the grouping mark at `at`; 0: there is none. `mark` is the decimal mark.
 std::size_t grouping_at(std::string_view field, std::size_t at, DecimalMark mark) {
   const std::string_view other = mark == DecimalMark::point ? ","sv : "."sv;
@@ -38,9 +46,13 @@ std::size_t grouping_at(std::string_view field, std::size_t at, DecimalMark mark
 std::string_view ungrouped(std::string_view field, DecimalMark mark, std::array<char, kLongest>& text) {
   if (field.empty() || field.size() > text.size()) return {};
   std::size_t size = 0, at = 0;
-  if (field.front() == '-') text[size++] = '-';
-  if (field.front() == '-' || field.front() == '+') ++at;
-  if (at < field.size() && (field[at] == '-' || field[at] == '+')) return {};
+  if (const std::size_t length = minus_at(field, 0); length > 0) {
+    text[size++] = '-';
+    at = length;
+  } else if (field.front() == '+') {
+    at = 1;
+  }
+  if (at < field.size() && (minus_at(field, at) > 0 || field[at] == '+')) return {};
   std::string_view grouping;
   while (true) {
     std::size_t run = 0;
@@ -53,11 +65,13 @@ std::string_view ungrouped(std::string_view field, DecimalMark mark, std::array<
     grouping = found;
     at += length;
   }
-  for (bool marked = false; at < field.size(); ++at) {
+  for (bool marked = false; at < field.size();) {
     const bool is_mark = !marked && field[at] == static_cast<char>(mark);
     if (!is_mark && (field[at] == ',' || field[at] == '.')) return {};
     marked = marked || is_mark;
-    text[size++] = is_mark ? '.' : field[at];
+    const std::size_t minus = minus_at(field, at);
+    text[size++] = is_mark ? '.' : minus > 0 ? '-' : field[at];
+    at += std::max<std::size_t>(minus, 1);
   }
   return {text.data(), size};
 }

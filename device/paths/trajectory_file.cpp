@@ -21,6 +21,9 @@ constexpr double kDay_s = 86'400.0;
 constexpr double kEpochFrom_s = 1e9, kEpochTo_s = 4.1e9;
 constexpr double kLatest_s = 1e11;      // above all seconds since the year 0
 constexpr double kSlowestStep_s = 1.0;  // if the median step is this long, the unit may not be seconds
+// Largest coordinate (unit: m), as in a scene, and largest force (unit: N). Beyond it, motions between
+// samples, and squares of forces, would overflow.
+constexpr double kLargest = 1e9;
 
 struct ClockUnit {
   double in_s;
@@ -103,8 +106,9 @@ class RowReader {
   }
   [[nodiscard]] double in_si(std::size_t role) const {
     const double value = number(role) * columns_.role[role]->in_si;
-    if (!std::isfinite(value)) reader_.refuse("a value too large to be used; correct or leave out the line");
-    return value;
+    if (role == role_time || std::abs(value) <= kLargest) return value;
+    reader_.refuse(shown(fields_[columns_.role[role]->index]) + " is more than " + short_number(kLargest) +
+                   (role < role_fx ? " m" : " N") + "; correct or leave out the line");
   }
   [[nodiscard]] glm::dvec3 vector_in_si(std::size_t first) const {
     return {in_si(first), in_si(first + 1), in_si(first + 2)};

@@ -10,6 +10,8 @@ namespace hybrid {
 namespace {
 
 constexpr std::array<std::string_view, 4> kMeshEndings{".obj", ".ply", ".stl", ".off"};
+constexpr std::array<std::string_view, 7> kVolumeEndings{".nii", ".nrrd", ".nhdr", ".mha",
+                                                         ".mhd", ".dcm",  ".ima"};
 // Endings of the formats that the program reads or writes.
 constexpr std::array<std::string_view, 18> kKnownEndings{".toml", ".json", ".csv",  ".txt", ".traj", ".svg",
                                                          ".png",  ".obj",  ".ply",  ".stl", ".off",  ".gz",
@@ -19,6 +21,12 @@ constexpr std::array<std::string_view, 18> kKnownEndings{".toml", ".json", ".csv
                                 const std::string& known) {
   throw std::runtime_error(std::string(option) + " " + file.string() + ": '" + file.extension().string() +
                            "' names another format than what is written there; use a name with " + known);
+}
+
+// The ending of the file that a .gz holds.
+std::string unpacked_ending(const std::filesystem::path& file) {
+  const std::string last = lower_ending(file);
+  return last == ".gz" ? lower_ending(file.stem()) : last;
 }
 
 }  // namespace
@@ -32,9 +40,13 @@ std::string lower_ending(const std::filesystem::path& file) {
 }
 
 bool is_mesh_name(const std::filesystem::path& file) {
-  const std::string last = lower_ending(file);
-  const std::string ending = last == ".gz" ? lower_ending(file.stem()) : last;
+  const std::string ending = unpacked_ending(file);
   return std::find(kMeshEndings.begin(), kMeshEndings.end(), ending) != kMeshEndings.end();
+}
+
+bool is_volume_name(const std::filesystem::path& file) {
+  const std::string ending = unpacked_ending(file);
+  return std::find(kVolumeEndings.begin(), kVolumeEndings.end(), ending) != kVolumeEndings.end();
 }
 
 void require_ending(std::string_view option, const std::filesystem::path& file,

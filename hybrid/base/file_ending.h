@@ -15,6 +15,9 @@ std::string lower_ending(const std::filesystem::path& file);
 // Is it the name of a mesh: .obj, .ply, .stl or .off, each also with .gz?
 bool is_mesh_name(const std::filesystem::path& file);
 
+// Is it the name of a volume: NIfTI (also with .gz), NRRD, MetaImage or one slice of DICOM?
+bool is_volume_name(const std::filesystem::path& file);
+
 // Refuses an output file whose ending stands for another format than `endings`: throws std::runtime_error
 // with `option`, `file` and the allowed endings. Some names have any format: a name without an ending, "-",
 // and anything that is no ordinary file (a pipe, /dev/stdout).

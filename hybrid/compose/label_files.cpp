@@ -12,7 +12,9 @@
 #include <sstream>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/compose/label_names.h"
 #include "hybrid/compose/label_rows.h"
 #include "polygon/files/file_bytes.h"
@@ -23,25 +25,12 @@ namespace {
 constexpr std::uintmax_t kMostBytes = 1U << 20;  // ten times the size of FreeSurfer's table of all its labels
 constexpr int kMostLabel = 255;                  // the highest label of a volume
 
-// Position of the first byte that is not UTF-8 (RFC 3629); npos if there is none.
+// Position of the first byte that is not UTF-8; npos if there is none.
 std::size_t first_outside_utf8(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
-  for (std::size_t i = 0; i < text.size();) {
-    const unsigned lead = byte(i);
-    const std::size_t length = lead < 0x80U                     ? 1
-                               : lead >= 0xC2U && lead <= 0xDFU ? 2
-                               : lead >= 0xE0U && lead <= 0xEFU ? 3
-                               : lead >= 0xF0U && lead <= 0xF4U ? 4
-                                                                : 0;
-    if (length == 0) return i;
-    for (std::size_t k = 1; k < length; ++k) {
-      if ((byte(i + k) & 0xC0U) != 0x80U) return i;
-    }
-    const unsigned next = byte(i + 1);
-    const bool overlong = (lead == 0xE0U && next < 0xA0U) || (lead == 0xF0U && next < 0x90U);
-    const bool surrogate = lead == 0xEDU && next > 0x9FU, beyond = lead == 0xF4U && next > 0x8FU;
-    if (overlong || surrogate || beyond) return i;
-    i += length;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = character_at(text, at);
+    if (length == 0) return at;
+    at += length;
   }
   return std::string_view::npos;
 }
@@ -55,6 +44,10 @@ std::size_t line_at(std::string_view text, std::size_t place) {
 // UTF-8 text without its byte-order mark, and with "\n" at the end of each line.
 std::string read_text(const std::filesystem::path& file) {
   std::error_code error;
+  if (std::filesystem::is_directory(file, error)) {
+    throw ComposeError(fmt::format(
+        "{}: is a folder; give the table of label names itself (CSV: number, name)", file.string()));
+  }
   if (!std::filesystem::is_regular_file(file, error)) {
     throw ComposeError(fmt::format(
         "{}: there is no such file; give the table of label names (CSV: number, name)", file.string()));
@@ -111,6 +104,11 @@ class NameTable {
     if (label > kMostLabel) {
       if (beyond_ == 0) beyond_ = label;
       return;
+    }
+    if (!is_printable(name)) {
+      throw ComposeError(fmt::format(
+          "{}: the name of label {} holds a character that cannot be printed; write the name anew", where,
+          label));
     }
     const auto [at, fresh] = names_.try_emplace(static_cast<int>(label), name);
     if (!fresh && at->second != name) {
@@ -196,6 +194,20 @@ void add_items(const NameJson& table, NameTable& names, const std::string& where
   }
 }
 
+// Parses, and refuses an object that has a key twice. Most readers of JSON keep only one of the two values.
+NameJson parse_json(const std::string& text, const std::string& file) {
+  std::vector<std::set<std::string>> keys;  // of the objects that are open
+  return NameJson::parse(text, [&](int, NameJson::parse_event_t event, NameJson& value) {
+    if (event == NameJson::parse_event_t::object_start) keys.emplace_back();
+    if (event == NameJson::parse_event_t::object_end) keys.pop_back();
+    if (event == NameJson::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second) {
+      throw ComposeError(
+          fmt::format("{}: has the key {} twice in an object; keep one of them", file, value.dump()));
+    }
+    return true;
+  });
+}
+
 LabelNames from_json(const std::filesystem::path& file, const std::string& text) {
   const std::string remedy =
       "give {\"labels\": {\"liver\": 1, …}} as in dataset.json of nnU-Net, {\"1\": \"liver\", …}, a list of "
@@ -203,7 +215,7 @@ LabelNames from_json(const std::filesystem::path& file, const std::string& text)
       "or a CSV with number, name in a row";
   NameJson json;
   try {
-    json = NameJson::parse(text);
+    json = parse_json(text, file.string());
   } catch (const NameJson::parse_error& error) {
     throw ComposeError(fmt::format("{}:{}: is no JSON; {}", file.string(),
                                    line_at(text, error.byte > 0 ? error.byte - 1 : 0), remedy));

@@ -185,6 +185,7 @@ class RowReader {
       if (!open.words.empty() && is_hex_colour(open.words.back())) open.words.pop_back();
       if (open.numbers_at_end() >= kLeastColour) open.words.resize(open.words.size() - colour);
       for (const std::string& word : open.words) open.row.name += (open.row.name.empty() ? "" : " ") + word;
+      open.row.name = without_blanks(open.row.name);
       if (open.row.name.empty() && open.row.label != 0) refuse(open.row.line, "the row has no name");
       if (open.row.name == "n/a") open.row.name.clear();
       rows.push_back(std::move(open.row));

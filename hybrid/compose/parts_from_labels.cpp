@@ -9,6 +9,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/base/process_memory.h"
 #include "hybrid/base/whole_file.h"
 #include "hybrid/geometry/surface_nets.h"
@@ -244,7 +245,7 @@ std::string name_of_tissue(const LabelVolume& tissue, const LabelNames& names, c
   constexpr std::size_t kNamed = 2;  // labels that the name of an object contains
   std::string name;
   for (std::size_t n = 0; n < largest.size() && n < kNamed; ++n)
-    name += (name.empty() ? "" : "_and_") + largest[n].second.substr(0, 20);
+    name.append(name.empty() ? "" : "_and_").append(whole_characters(largest[n].second, 20));
   if (largest.size() > kNamed) name += fmt::format("_and_{}", largest.size() - kNamed);
   return name;
 }

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <utility>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/base/whole_file.h"
 #include "hybrid/compose/label_names.h"
 
@@ -44,6 +45,11 @@ bool is_on_disk(const fs::path& file) {
   const bool done = ::fsync(descriptor) == 0;
   ::close(descriptor);
   return done;
+}
+
+std::string in_small_letters(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
 }
 
 }  // namespace
@@ -127,18 +133,23 @@ void ComposeFolder::keep() {
   }
 }
 
-std::string ComposeFolder::unused_name(const std::string& wanted) {
-  std::string clean;
-  for (const char c : wanted) {
-    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
-    clean += plain ? c : '_';
+std::string name_letters(std::string_view text) {
+  constexpr std::size_t kMostBytes = 48;
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = printable_at(text, at);
+    const bool ascii = length <= 1;
+    const bool kept = !ascii || std::isalnum(static_cast<unsigned char>(text[at])) != 0 || text[at] == '-';
+    out += kept ? text.substr(at, length) : "_";
+    at += std::max<std::size_t>(character_at(text, at), 1);
   }
-  clean.resize(std::min<std::size_t>(clean.size(), 48));
-  if (clean.empty()) clean = "object";
+  return std::string(whole_characters(out, kMostBytes));
+}
+
+std::string ComposeFolder::unused_name(const std::string& wanted) {
+  const std::string clean = wanted.empty() ? "object" : name_letters(wanted);
   std::string name = clean;
-  for (int n = 2; std::find(names_.begin(), names_.end(), name) != names_.end(); ++n)
-    name = fmt::format("{}-{}", clean, n);
-  names_.push_back(name);
+  for (int n = 2; !names_.insert(in_small_letters(name)).second; ++n) name = fmt::format("{}-{}", clean, n);
   return name;
 }
 

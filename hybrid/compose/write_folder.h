@@ -5,7 +5,9 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace hybrid {
@@ -30,7 +32,8 @@ class ComposeFolder {
   void drop(const std::string& name);
   // Copies an input file. If the input is the target file itself, it stays as it is.
   void copy(const std::filesystem::path& from, const std::string& name);
-  // A name for a file or object that was not given out before. It has only letters, digits, '-' and '_'.
+  // A name for a file or object by name_letters() that was not given out before, not even in other case:
+  // some file systems ignore case.
   std::string unused_name(const std::string& wanted);
   // Puts all files in place. Throws ComposeError.
   void keep();
@@ -43,7 +46,11 @@ class ComposeFolder {
   std::filesystem::path folder_, staging_;
   bool force_ = false, made_ = false;
   std::vector<std::string> written_;
-  std::vector<std::string> names_;
+  std::set<std::string> names_;  // in small letters
 };
+
+// The text with '_' for each character that is neither a letter or digit of ASCII, nor '-', nor a printable
+// character beyond ASCII; cut to 48 bytes.
+std::string name_letters(std::string_view text);
 
 }  // namespace hybrid

@@ -7,6 +7,9 @@
 #include <cctype>
 #include <cmath>
 #include <iterator>
+#include <string_view>
+
+#include "hybrid/base/letters.h"
 
 namespace hybrid {
 namespace {
@@ -14,33 +17,46 @@ namespace {
 constexpr double kToolShare = 0.02;  // radius of the tool, as a share of the longest object
 constexpr double kCoupling = 800.0;  // N/m; does not buzz in any grip, see `hybrid stability`
 
-// The text as a quoted string of TOML. Names and titles come from files, so any character may occur.
+// The text with '_' for characters that may not be printed: a line break would end the comment that it stands
+// in. Names and titles come from files, so any character may occur.
+std::string plain(std::string_view text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = printable_at(text, at);
+    out += length > 0 ? text.substr(at, length) : "_";
+    at += std::max<std::size_t>(character_at(text, at), 1);
+  }
+  return out;
+}
+
+// The text as a quoted string of TOML.
 std::string quoted(const std::string& text) {
   std::string out = "\"";
-  for (const char c : text) {
+  for (const char c : plain(text)) {
     if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? '_' : c;
+    out += c;
   }
   return out + "\"";
 }
 
-// The text without control characters: a line break would end the comment that it stands in.
-std::string plain(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; },
-      '_');
-  return text;
+// The text as a key of TOML: bare where that is allowed.
+std::string as_key(const std::string& text) {
+  const bool bare = !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
+    return static_cast<unsigned char>(c) < 0x80 &&
+           (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_');
+  });
+  return bare ? text : quoted(text);
 }
 
-// Names of materials. Each is the name of its label as a bare key of TOML, so that reports, plots and
-// pictures name organs.
+// Names of materials. Each is the name of its label, with '_' for blanks and signs, so that reports, plots
+// and pictures name organs.
 class MaterialNames {
  public:
   explicit MaterialNames(const SceneParts& parts) {
     for (const SoftPart& part : parts.soft) {
       auto& of_part = of_part_.emplace_back();
       for (const auto& [label, tissue] : part.materials)
-        of_part[label] = unused(key_of(part.label_names.at(label)), tissue);
+        of_part[label] = unused(part.label_names.at(label), tissue);
     }
   }
   [[nodiscard]] const std::string& of(std::size_t part, int label) const { return of_part_[part].at(label); }
@@ -48,24 +64,22 @@ class MaterialNames {
   [[nodiscard]] const std::map<std::string, const Tissue*>& all() const { return all_; }
 
  private:
-  static std::string key_of(const std::string& label_name) {
-    std::string key = label_name;
-    for (char& c : key) {
-      const bool bare = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
-      if (!bare || static_cast<unsigned char>(c) >= 0x80) c = '_';
-    }
-    return key.empty() ? "tissue" : key;
-  }
   // A name that no other material has. Labels with the same name and tissue share a material.
-  std::string unused(const std::string& key, const Tissue* tissue) {
+  std::string unused(const std::string& label_name, const Tissue* tissue) {
+    const std::string key = name_letters(label_name);
     std::string name = key;
-    for (int n = 2; all_.contains(name) && all_.at(name) != tissue; ++n) name = fmt::format("{}-{}", key, n);
+    for (int n = 2;; ++n) {
+      const auto [of, fresh] = label_of_.try_emplace(name, label_name);
+      if (fresh || (of->second == label_name && all_.at(name) == tissue)) break;
+      name = fmt::format("{}-{}", key, n);
+    }
     all_[name] = tissue;
     return name;
   }
 
   std::vector<std::map<int, std::string>> of_part_;
   std::map<std::string, const Tissue*> all_;
+  std::map<std::string, std::string> label_of_;  // [name of a material] the name of its label
 };
 
 std::string vector_mm(const glm::dvec3& v) {
@@ -97,7 +111,8 @@ void add_materials(std::string& text, const MaterialNames& names) {
     text += fmt::format(
         "[material.{}]\nyoung = {:.4g} # Pa; {}{}{}\npoisson = {:.3g}\nstretch = [0.5, 1.5]\nshear = "
         "0.5\n\n",
-        name, links.young_Pa, published, t->measured ? "" : "no measurement: ", t->source, links.poisson);
+        as_key(name), links.young_Pa, published, t->measured ? "" : "no measurement: ", t->source,
+        links.poisson);
   }
 }
 

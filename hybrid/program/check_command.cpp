@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "hybrid/base/file_ending.h"
@@ -129,6 +131,10 @@ void check_volume_file(const std::filesystem::path& path, Json& file) {
   file["dims"] = h.dims;
   file["spacing_m"] = {h.spacing_m.x, h.spacing_m.y, h.spacing_m.z};
   const voxel::VolumeStatistics s = voxel::read_volume_statistics(path, usable_memory_bytes() / 4);
+  if (s.not_numbers > 0) {
+    add_finding(file, {"V02", polygon::Severity::warning, s.not_numbers,
+                       "voxels are not numbers (NaN): they are in no range, and count as empty"});
+  }
   file["minimum"] = s.minimum;
   file["maximum"] = s.maximum;
   Json labels = Json::object();
@@ -224,8 +230,13 @@ int check(const CheckCommand& command) {
         check_scene_file(path, file);
       } else if (is_mesh_name(path)) {
         check_mesh_file(path, command, file);
-      } else {
+      } else if (is_volume_name(path) || !std::filesystem::is_regular_file(path)) {
         check_volume_file(path, file);
+      } else {
+        throw std::runtime_error(
+            path.string() +
+            ": its name has the ending of no scene (.toml), mesh (.obj, .ply, .stl, .off) or "
+            "volume (.nii, .nrrd, .nhdr, .mha, .mhd); rename it, or export it in one of these");
       }
       fmt::print(words, "{}: {}\n", path.string(), file["summary"].get<std::string>());
     } catch (const std::exception& e) {

@@ -3,13 +3,13 @@
 #include "hybrid/scene/read_rigid.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <limits>
 #include <set>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/scene/itk_transform.h"
 #include "hybrid/scene/read_feel.h"
 #include "hybrid/scene/read_motion.h"
@@ -26,9 +26,8 @@ constexpr UnsupportedKey rigid_later[] = {
 };
 
 bool usable_name(const std::string& name) {
-  const bool has_control = std::any_of(
-      name.begin(), name.end(), [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; });
-  return !name.empty() && name.size() <= longest_name && !has_control;
+  const bool is_blank = name.find_first_not_of(' ') == std::string::npos;
+  return !is_blank && name.size() <= longest_name && is_printable(name);
 }
 
 // Rotation about the scene's x axis, then about its y axis, then about its z axis.

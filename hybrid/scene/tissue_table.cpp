@@ -26,14 +26,15 @@ constexpr std::array kTissues{
     bone("rib", "rib rib_* ribs* *_rib *_rib_* *_ribs"),
     bone("vertebra", "vertebra* *_vertebra* *vertebrae"),
     bone("sacrum", "sacrum* *coccyx*"),
-    bone("hip", "hip hip_* *_hip *pelvic_bone* *ilium* *ischium*"),
+    bone("hip", "hip hip_* *_hip pelvis pelvis_left pelvis_right left_pelvis right_pelvis *pelvic_bone* *ilium* *ischium*"),
     bone("femur", "femur* *_femur*"),
     bone("humerus", "humerus* *_humerus*"),
     bone("scapula", "scapula* *_scapula*"),
     bone("clavicle", "clavicula* *_clavicula* clavicle* *_clavicle*"),
     bone("sternum", "sternum*"),
     bone("skull", "skull* *_skull* *cranium* *mandible* *maxilla*"),
-    bone("bone", "*bone* *tibia* *fibula* *patella* *radius* *ulna* *carpal* *tarsal* *phalan* *teeth* *tooth*"),
+    bone("bone", "*bone* *tibia* *fibula* *patella* *radius* *ulna* *carpal* *tarsal* *phalan* talus* *_talus* calcaneus* *_calcaneus* "
+         "*teeth* *tooth*"),
     // Vessels come before the organs that they are named after.
     Tissue{"vessel", "*aorta* *artery* *arteri* *vein* *vena* *cava* *vessel* *trunk*", false, 1.0e5, 0.45, false,
            "a wall around blood: order of the aorta's pressure-strain modulus, 100 kPa", {0.80F, 0.15F, 0.15F}},
@@ -78,6 +79,19 @@ char lower(char c) {
   return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
 }
 
+// The words of a label's name with '_' between them: "Left-Femur", "left femur" and "LeftFemur" are one name.
+std::string joined_words(std::string_view label_name) {
+  std::string name;
+  bool after_small = false;  // after a small letter
+  for (const char c : label_name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (after_small && std::isupper(byte) != 0) name += '_';
+    name += std::isalnum(byte) != 0 || byte >= 0x80U ? c : '_';
+    after_small = std::islower(byte) != 0;
+  }
+  return name;
+}
+
 }  // namespace
 
 LatticeStiffness as_six_links(const Tissue& tissue) {
@@ -116,8 +130,7 @@ bool fits_pattern(std::string_view name, std::string_view pattern) {
 }
 
 const Tissue* find_tissue(std::string_view label_name) {
-  std::string name(label_name);
-  std::replace(name.begin(), name.end(), ' ', '_');
+  const std::string name = joined_words(label_name);
   for (const Tissue& tissue : kTissues) {
     std::string_view rest = tissue.patterns;
     while (!rest.empty()) {

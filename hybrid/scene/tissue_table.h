@@ -35,7 +35,7 @@ struct LatticeStiffness {
 };
 LatticeStiffness as_six_links(const Tissue& tissue);
 
-// The row that a label's name belongs to; null when there is none.
+// The row that a label's name belongs to, however its words are joined; null when there is none.
 const Tissue* find_tissue(std::string_view label_name);
 
 // The tissue of a label that fits no row.

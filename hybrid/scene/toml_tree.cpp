@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/base/number_text.h"
 #include "hybrid/scene/toml_prescan.h"
 
@@ -153,27 +154,13 @@ std::string_view kind_in_words(TreeNode::Kind kind) {
 
 std::string printable(std::string_view text, std::size_t longest) {
   std::string out;
-  std::size_t i = 0;
-  while (i < text.size() && out.size() < longest) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    // Length of a UTF-8 sequence by its first byte; its other bytes must be continuations.
-    std::size_t length = 1;
-    if (byte >= 0xC2 && byte <= 0xDF) length = 2;
-    if (byte >= 0xE0 && byte <= 0xEF) length = 3;
-    if (byte >= 0xF0 && byte <= 0xF4) length = 4;
-    bool good = byte < 0x80 ? (byte >= 0x20 && byte != 0x7F) : length > 1 && i + length <= text.size();
-    for (std::size_t k = 1; good && k < length; ++k) {
-      good = (static_cast<unsigned char>(text[i + k]) & 0xC0U) == 0x80U;
-    }
-    if (good) {
-      out += text.substr(i, length);
-      i += length;
-    } else {
-      out += '?';
-      ++i;
-    }
+  std::size_t at = 0;
+  while (at < text.size() && out.size() < longest) {
+    const std::size_t length = printable_at(text, at);
+    out += length > 0 ? text.substr(at, length) : "?";
+    at += std::max<std::size_t>(character_at(text, at), 1);
   }
-  if (i < text.size()) out += "...";
+  if (at < text.size()) out += "...";
   return out;
 }
 

@@ -66,15 +66,30 @@ std::string unpack(const std::filesystem::path& file, std::uint64_t max_bytes) {
 }  // namespace
 
 std::string_view other_kind(std::string_view first_bytes) {
+  using namespace std::string_view_literals;
   struct Kind {
     std::string_view begins, is;
   };
-  constexpr std::array<Kind, 4> kKinds{{{"version https://git-lfs.github.com/",
-                                         "is a Git LFS pointer, which stands for a file that was not "
-                                         "fetched; run 'git lfs pull' in its repository"},
-                                        {"<!DOCTYPE html", "is a web page; download the file itself"},
-                                        {"<!doctype html", "is a web page; download the file itself"},
-                                        {"<html", "is a web page; download the file itself"}}};
+  constexpr std::array<Kind, 14> kKinds{
+      {{"version https://git-lfs.github.com/"sv,
+        "is a Git LFS pointer, which stands for a file that was not fetched; run 'git lfs pull' in its "
+        "repository"sv},
+       {"<!DOCTYPE html"sv, "is a web page; download the file itself"sv},
+       {"<!doctype html"sv, "is a web page; download the file itself"sv},
+       {"<html"sv, "is a web page; download the file itself"sv},
+       {"PK\x03\x04"sv,
+        "is a ZIP file, as 3MF and workbooks (.xlsx, .ods) are; unpack it, or export it in another format"sv},
+       {"BZh"sv, "is packed by bzip2; unpack it, or pack it by gzip"sv},
+       {"\xFD"
+        "7zXZ\0"sv,
+        "is packed by xz; unpack it, or pack it by gzip"sv},
+       {"\x28\xB5\x2F\xFD"sv, "is packed by zstd; unpack it, or pack it by gzip"sv},
+       {"7z\xBC\xAF\x27\x1C"sv, "is packed by 7-Zip; unpack it"sv},
+       {"Rar!"sv, "is packed by RAR; unpack it"sv},
+       {"glTF"sv, "is a glTF file; export it in another format"sv},
+       {"ISO-10303-21"sv, "is a STEP file, which has no triangles; export a mesh"sv},
+       {"# vtk DataFile"sv, "is a VTK file; export it in another format"sv},
+       {"<?xml"sv, "is an XML file, as VTP, X3D and COLLADA are; export it in another format"sv}}};
   first_bytes = without_byte_order_mark(first_bytes);
   for (const Kind& kind : kKinds) {
     if (first_bytes.starts_with(kind.begins)) return kind.is;
@@ -99,6 +114,9 @@ std::string read_file_bytes(const std::filesystem::path& file, bool packed, std:
     const std::string_view other = other_kind({first.data(), static_cast<std::size_t>(in.gcount())});
     if (!other.empty()) refuse(file, std::string(other));
     if (packed) return unpack(file, max_bytes);
+    if (std::string_view(first.data(), 2) == "\x1F\x8B") {
+      refuse(file, "is packed by gzip; let its name end in .gz, as in " + file.filename().string() + ".gz");
+    }
     in.clear();
     in.seekg(0);
     std::string bytes(size, '\0');

@@ -243,6 +243,14 @@ std::string lower_case(std::string text) {
   return text;
 }
 
+// The ending that a mesh file should have by its first line, in lower case; empty if the line does not tell.
+std::string_view ending_by_first_line(std::string_view bytes) {
+  const std::string_view line = bytes.substr(0, std::min<std::size_t>(bytes.find_first_of("\r\n"), 80));
+  if (line == "ply") return ".ply";
+  if (line == "OFF" || line == "COFF" || line == "NOFF") return ".off";
+  return line.starts_with("solid ") ? ".stl" : "";
+}
+
 }  // namespace
 
 MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& options) {
@@ -269,6 +277,10 @@ MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& opt
   try {
     PrescannedFile prescanned = [&] {
       std::string bytes = read_file_bytes(file, packed, options.max_bytes);
+      const std::string_view by_line = ending_by_first_line(without_byte_order_mark(bytes));
+      if (!by_line.empty() && by_line != extension)
+        refuse_mesh(file,
+                    "is named " + extension + " but begins as " + std::string(by_line) + " does; rename it");
       return kind->prescan(file, bytes);
     }();
     SoupImporter soup = read_by_openmesh(file, prescanned);

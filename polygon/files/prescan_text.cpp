@@ -11,6 +11,8 @@
 namespace polygon {
 namespace {
 
+constexpr std::size_t kFirstBytes = 512;  // enough to tell binary files
+
 bool is_space(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
 }
@@ -31,6 +33,9 @@ std::string_view plain_text(const std::filesystem::path& file, std::span<char> b
   const std::string_view text(bytes.data(), bytes.size());
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
     refuse_mesh(file, "is UTF-16 text, which is not read; save it as UTF-8 or plain text");
+  if (text.substr(0, kFirstBytes).find('\0') != std::string_view::npos)
+    refuse_mesh(file,
+                "holds bytes of value 0, so it is no text; is it another kind of file under this name?");
   mend_line_ends(bytes);
   return without_byte_order_mark(text);
 }

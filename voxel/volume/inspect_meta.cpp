@@ -14,6 +14,10 @@ void inspect_meta(const fs::path& path, VoxelPlace& place) {
   const TextHeader header = read_text_header(path, '=', "elementdatafile");
   if (!header.has("elementdatafile")) refuse_volume(path, "the header has no ElementDataFile; ", kDamaged);
   check_axes(path, header.number("ndims", std::nan("")));
+  for (const char* field : {"DimSize", "ElementType"}) {
+    if (header.has(lower_case(field))) continue;
+    refuse_volume(path, "the header has no ", field, " before ElementDataFile; ", kDamaged);
+  }
   place.offset = header.bytes;
   find_data_file(path, header.text("elementdatafile"), place);
   const std::string compressed = lower_case(header.text("compresseddata"));

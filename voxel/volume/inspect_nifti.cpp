@@ -216,7 +216,8 @@ bool differ(const NiftiAffine& p, const NiftiAffine& q, const glm::dvec3& spacin
 // no qform. Otherwise the qform is used. ITK makes the same choice, so programs built on ITK show the volume
 // at the same place.
 void read_nifti_frame(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
-  constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
+  constexpr int kScanner = 1;                   // NIFTI_XFORM_SCANNER_ANAT
+  constexpr double kQuaternionRounding = 1e-3;  // headers hold single precision
   check_nifti_frame(path, header);
   FileFrame& frame = place.frame;
   if (header.qform() <= 0 && header.sform() <= 0) {
@@ -239,7 +240,13 @@ void read_nifti_frame(const fs::path& path, const NiftiHeader& header, VoxelPlac
         "the header's qform and sform put the volume in different places; look whether it lies "
         "where it should");
   }
-  const NiftiAffine& affine = rectangular && (header.sform() == kScanner || header.qform() <= 0) ? s : q;
+  const bool takes_s = rectangular && (header.sform() == kScanner || header.qform() <= 0);
+  const double length = glm::length(glm::dvec3(header.real(256), header.real(260), header.real(264)));
+  if (!takes_s && length > 1.0 + kQuaternionRounding) {
+    refuse_volume(path, "the header's qform has a quaternion of length ", length,
+                  " without its real part, which is no rotation; ", kDamaged);
+  }
+  const NiftiAffine& affine = takes_s ? s : q;
   const glm::dvec3 to_lps(-1.0, -1.0, 1.0);
   frame.origin = affine.origin * to_lps;
   for (int axis = 0; axis < static_cast<int>(place.axes); ++axis)

@@ -205,12 +205,20 @@ Component nrrd_component(const fs::path& path, const TextHeader& header) {
 }
 
 // The length units that a field lists: one for each axis, or for each coordinate of the space. Sets
-// `place.stated_unit` to the first unit that is stated.
+// `place.stated_unit` to the first unit that is stated. A unit that is not known beside known ones is said.
 std::vector<std::optional<double>> nrrd_units(const TextHeader& header, const char* key, VoxelPlace& place) {
   std::vector<std::optional<double>> units;
+  std::string unknown;
   for (const std::string& word : words_between_blanks(header.text(key))) {
     units.push_back(length_unit_m(word));
-    if (place.stated_unit.empty() && word != "???" && lower_case(word) != "none") place.stated_unit = word;
+    if (word.empty() || word == "???" || lower_case(word) == "none") continue;
+    if (place.stated_unit.empty()) place.stated_unit = word;
+    if (!units.back()) unknown = word;
+  }
+  const bool any = std::any_of(units.begin(), units.end(), [](const auto& unit) { return unit.has_value(); });
+  if (any && !unknown.empty()) {
+    place.notes.push_back("the header gives an axis the unit '" + unknown +
+                          "', which is no length known here; it is taken as mm");
   }
   return units;
 }

@@ -345,6 +345,7 @@ VolumeStatistics statistics_of(const VolumeData& data, const NextSlice& next) {
       const std::span<const std::byte> bytes = next();
       for (std::size_t n = 0; n < bytes.size() / sizeof(T); ++n) {
         const auto value = static_cast<double>(value_at<T>(bytes, n));
+        if (std::isnan(value)) ++statistics.not_numbers;
         if (value < low) low = value;  // false for NaN, which is in no range
         if (value > high) high = value;
         if (labels && value >= 0.0 && value <= 255.0 && value == std::floor(value)) {

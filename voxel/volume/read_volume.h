@@ -72,6 +72,7 @@ LabelVolume load_volume(const std::filesystem::path& path, const VolumeFileOptio
 // Labels with their voxel counts, and the range of intensities, for the command `check`.
 struct VolumeStatistics {
   double minimum = 0.0, maximum = 0.0;
+  std::size_t not_numbers = 0;  // voxels whose value is NaN: they are in no range
   // Empty unless every value is a whole number in 0..255. In rising order; 0 (empty) is listed if present.
   std::vector<std::pair<int, std::size_t>> label_counts;
 };

@@ -69,6 +69,23 @@ TEST(LineReader, AByteOrderMarkOfUtf8IsNoPartOfTheText) {
   EXPECT_EQ(device::read_trajectory({.file = packed}).t_s.size(), 2U);
 }
 
+TEST(LineReader, TextOfTheFileIsShownInMessagesAsItIsAndSafely) {
+  using device::shown;
+  EXPECT_EQ(shown("größe 肝"), "'größe 肝'");
+  EXPECT_EQ(shown("a\x1B[31m\tb\x7F"), "'a?[31m?b?'");
+  EXPECT_EQ(shown("gr\xF6\xDF"
+                  "e"),
+            "'gr\?\?e'")
+      << "Latin-1";
+  EXPECT_EQ(shown("\xC2\x9B"
+                  "31m\xE2\x80"),
+            "'\?\?31m\?\?'")
+      << "a control character, and a cut one";
+  std::string forty;
+  for (int i = 0; i < 40; ++i) forty += "ü";
+  EXPECT_EQ(shown(forty + "x"), "'" + forty + "'");
+}
+
 TEST(LineReader, FilesThatAreNoPlainTextAreRefusedByName) {
   std::string wide, swapped;
   for (const char c : kRows) {

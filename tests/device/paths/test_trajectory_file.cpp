@@ -110,6 +110,8 @@ TEST(TrajectoryFile, WhatDoesNotFitIsRefusedWithItsPlace) {
   EXPECT_THAT(refusal("n.csv", "t_s,x_m,y_m,z_m\n0,1,2,3\n"), HasSubstr("no columns of a force"));
   EXPECT_THAT(refusal("o.csv", "t_s,a,b,c,fx,fy,fz\n0,1,2,3,4,5,6\n"), HasSubstr("no columns x, y and z"));
   EXPECT_THAT(refusal("p.csv", ""), HasSubstr("is empty"));
+  EXPECT_THAT(refusal("v.csv", "t_s,x_m,y_m,z_m,fx,fy,fz\n0,1,2,3,4,5,-1e200\n"),
+              HasSubstr("v.csv:2: '-1e200' is more than 1e+09 N"));
   EXPECT_THAT(refusal("q.csv", "t_s,x_m,y_m,z_m,fx,fy,fz\n"), HasSubstr("no rows"));
 }
 

@@ -126,6 +126,35 @@ TEST_F(ComposedTissue, LabelsNameTheObjectAndItsMaterials) {
   EXPECT_THAT(build_notes(built), AllOf(Not(HasSubstr("no effect")), Not(HasSubstr("no voxel has"))));
 }
 
+TEST_F(ComposedTissue, NamesKeepTheirLettersInAnyScript) {
+  std::vector<tests::LabelBox> boxes = tests::torso();
+  boxes.push_back({{14, 12, 8}, {31, 14, 23}, 6});
+  ComposeOptions options = of(tests::volume_of(boxes));
+  const std::string long_name(70, 'x');
+  options.names = write("names.csv", "1,肝臓\n2,Rib\n3,rib\n4,Milz (groß)\n6," + long_name + "\n");
+  const Composed composed = hybrid::compose(options);
+  const hybrid::Scene scene = hybrid::load_scene(composed.scene);
+  std::set<std::string> names;
+  for (const auto& [name, material] : scene.materials) names.insert(name);
+  EXPECT_EQ(names, (std::set<std::string>{"肝臓", "Milz__groß_", std::string(48, 'x')}));
+  EXPECT_EQ(scene.soft.at(0).name, "肝臓_and_Milz__groß__and_1");
+  // Files whose names differ in case only would be one file in some file systems.
+  EXPECT_EQ(scene.rigid.at(0).name, "Rib");
+  EXPECT_EQ(scene.rigid.at(1).name, "rib-2");
+}
+
+TEST_F(ComposedTissue, LabelsThatLookAlikeHaveTheirOwnMaterials) {
+  std::vector<tests::LabelBox> boxes = tests::torso();
+  boxes.push_back({{14, 12, 8}, {31, 14, 23}, 6});
+  ComposeOptions options = of(tests::volume_of(boxes));
+  options.names = write("names.csv", "1,part (1)\n2,rib\n3,rib\n4,part 1)\n6,part [1]\n");
+  const Composed composed = hybrid::compose(options);
+  const hybrid::Scene scene = hybrid::load_scene(composed.scene);
+  std::set<std::string> names;
+  for (const auto& [name, material] : scene.materials) names.insert(name);
+  EXPECT_EQ(names, (std::set<std::string>{"part__1_", "part__1_-2", "part_1_"}));
+}
+
 TEST_F(ComposedTissue, OneLabelGivesTheObjectItsName) {
   ComposeOptions options = of(tests::volume_of(tests::torso()));
   options.soft = {"spleen"};
@@ -134,7 +163,8 @@ TEST_F(ComposedTissue, OneLabelGivesTheObjectItsName) {
 
 TEST_F(ComposedTissue, LinksGetTheRatioForWhichTheyAreRightAndTheSameContactModulus) {
   const Composed composed = hybrid::compose(of(tests::volume_of(tests::torso())));
-  const hybrid::Material& liver = hybrid::load_scene(composed.scene).materials.at("liver");
+  const hybrid::Scene scene = hybrid::load_scene(composed.scene);
+  const hybrid::Material& liver = scene.materials.at("liver");
   EXPECT_EQ(liver.poisson, 0.3);
   EXPECT_FALSE(liver.energy.has_value());
   EXPECT_NEAR(liver.young_Pa / (1.0 - 0.3 * 0.3), 5500.0 / (1.0 - 0.45 * 0.45), 1.0);

@@ -165,6 +165,21 @@ TEST(LabelNames, WhatCannotBeReadNamesTheFileAndWhatToDo) {
            {"beyond.csv", "300,liver\n", "names no label from 1 to 255", "renumber"},
            {"twice.json", R"({"liver": 1, "spleen": 1})", "label 1 is called \"liver\" and \"spleen\"",
             "keep one"},
+           {"key.json", R"({"1": "femur", "2": "liver", "1": "tibia"})", "key.json: has the key \"1\" twice",
+            "keep one"},
+           {"escape.csv", "1,fem\x1B[31mur\n", "escape.csv:1: the name of label 1 holds a character",
+            "write the name"},
+           {"control.csv",
+            "1,rib\n2,fem\xC2\x9B"
+            "31mur\n",
+            "control.csv:2: the name of label 2", "write the name"},
+           {"turned.csv",
+            "1,\xE2\x80\xAE"
+            "rumef\n",
+            "cannot be printed", "write the name"},
+           {"line.json", R"({"1": "fem\nur"})", "cannot be printed", "write the name"},
+           {"blank.csv", "1,\"  \"\n2,liver\n", "blank.csv:1: the row has no name", "as in 5,liver"},
+           {"book.csv", "PK\x03\x04 and more", "book.csv: is a ZIP file", "workbooks"},
            {"broken.json", "{\"labels\":\n {\"liver\": 1,,}}", "broken.json:2: is no JSON", "nnU-Net"},
            {"large.json", R"({"liver": 1e999})", "large.json: holds a number that is too large", "nnU-Net"},
            {"none.json", R"({"index": {"Description": "a number"}})", "none.json: names no label",
@@ -172,6 +187,12 @@ TEST(LabelNames, WhatCannotBeReadNamesTheFileAndWhatToDo) {
     const std::string text = NamesFile(c.file, c.bytes).refusal();
     EXPECT_THAT(text, testing::HasSubstr(c.says)) << c.file;
     EXPECT_THAT(text, testing::HasSubstr(c.remedy)) << c.file;
+  }
+  try {
+    (void)hybrid::read_label_names(fs::temp_directory_path());
+    FAIL() << "a folder was read";
+  } catch (const hybrid::ComposeError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("is a folder"));
   }
 }
 
@@ -212,12 +233,28 @@ TEST(Tissues, AreKnownByTheirNames) {
                                                     {"brachiocephalic_trunk", "vessel"},
                                                     {"trachea", "airway"},
                                                     {"thyroid_gland", "thyroid"},
-                                                    {"adrenal_gland_left", "gland"}};
+                                                    {"adrenal_gland_left", "gland"},
+                                                    // However the words are joined.
+                                                    {"Left-Femur", "femur"},
+                                                    {"Right.Hip", "hip"},
+                                                    {"LeftHumerus", "humerus"},
+                                                    {"L/scapula", "scapula"},
+                                                    {"1: rib (left)", "rib"},
+                                                    {"ctx-Spinal-Cord", "spinal cord"},
+                                                    {"LeftCerebralWhiteMatter", "brain"},
+                                                    {"SubcutaneousFat", "fat"},
+                                                    {"pelvis", "hip"},
+                                                    {"Talus-Right", "bone"},
+                                                    {"renal_pelvis_of_kidney", "kidney"}};
   for (const auto& [label, tissue] : expected) {
     const hybrid::Tissue* found = hybrid::find_tissue(label);
     ASSERT_NE(found, nullptr) << label;
     EXPECT_EQ(found->name, tissue) << label;
   }
+  for (const char* none : {"mystery", "renal_pelvis", "biceps",
+                           "Sch\xC3\xA4"
+                           "del"})
+    EXPECT_TRUE(hybrid::find_tissue(none) == nullptr || !hybrid::find_tissue(none)->bone) << none;
   EXPECT_EQ(hybrid::find_tissue("mystery"), nullptr);
   for (const hybrid::Tissue& t : hybrid::tissue_table()) {
     EXPECT_FALSE(t.source.empty()) << t.name;

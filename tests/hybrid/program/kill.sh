@@ -143,22 +143,28 @@ long_mode() {
 
 # The short form leaves out modes that take long, and gives their kills to the others.
 short=$((kills < 100 ? 1 : 0))
-# share PERCENT: of the kills. The modes of the short form have 59 percent.
-share() { echo $((short ? (kills * $1 + 29) / 59 : kills * $1 / 100)); }
+# share PERCENT: of the kills. The modes of the short form have 54 percent.
+share() { echo $((short ? (kills * $1 + 27) / 54 : kills * $1 / 100)); }
 
-mode run "$(share 20)" "$program" run small.toml --samples 0 --trace out/t.csv --record out/r.rec --json out/j.json \
+mode run "$(share 16)" "$program" run small.toml --samples 0 --trace out/t.csv --record out/r.rec --json out/j.json \
   --save-surface out/s.stl --save-volume out/v.nii.gz
-mode compose "$(share 10)" "$program" compose --out out/starter --force --json out/j.json
-mode "compose of labels" "$(share 10)" "$program" compose --labels labels.nrrd --names labels.csv --out out/body --force \
+cp out/r.rec kept.rec
+mode replay "$(share 4)" "$program" replay kept.rec --json out/j.json
+mode compose "$(share 8)" "$program" compose --out out/starter --force --json out/j.json
+mode "compose of labels" "$(share 8)" "$program" compose --labels labels.nrrd --names labels.csv --out out/body --force \
   --json out/j.json
-mode check "$(share 5)" "$program" check small.toml --json out/j.json
+mode check "$(share 4)" "$program" check small.toml --json out/j.json
 mode "compare of whole scenes" "$(share 8)" "$program" compare small.toml small.toml --samples 0 --plot out/c.svg \
   --json out/c.json --report out/page
 mode bench "$(share 6)" "$program" bench occupancy --quick --only lookup --cells 1000 --plot out/b.svg --json out/b.json
 if ((short == 0)); then
-  mode "compare of models" "$(share 8)" "$program" compare small.toml --plot out/c.svg --json out/c.json --report out/page
-  mode "pictures and pages" "$(share 10)" "$program" run small.toml --samples 0 --plot out/p.svg --picture out/p.png \
+  mode "compare of models" "$(share 7)" "$program" compare small.toml --plot out/c.svg --json out/c.json --report out/page
+  mode "models in the scene" "$(share 8)" bash -c 'cp small.toml next.toml; mv next.toml out/scene.toml; exec "$@"' -- \
+    "$program" compare out/scene.toml --models --cache out/cache --write-variants --plot out/m.svg --json out/m.json \
     --report out/page
+  mode "pictures and pages" "$(share 9)" "$program" run small.toml --samples 0 --plot out/p.svg --picture out/p.png \
+    --report out/page
+  long_mode "bench of tissue" "$(share 4)" 12 "$program" bench soft --quick --plot out/b.svg --json out/b.json
   long_mode tune "$(share 7)" 12 "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json
   # What was kept is kept: the same command comes to its end.
   "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json > run.log 2>&1 ||
@@ -168,15 +174,15 @@ if ((short == 0)); then
   mv out/cache kept
   mode "tune --apply" "$(share 4)" bash -c 'cp small.toml next.toml; mv next.toml out/scene.toml; exec "$@"' -- \
     "$program" tune out/scene.toml --quick --cache kept --apply --json out/t.json
-  long_mode stability "$(share 4)" 10 "$program" stability "$scenes/wall.toml" --plot out/s.svg --json out/s.json \
+  long_mode stability "$(share 3)" 10 "$program" stability "$scenes/wall.toml" --plot out/s.svg --json out/s.json \
     --report out/page
-  long_mode validate "$(share 3)" 10 "$program" validate --quick --json out/v.json --report out/page
+  long_mode validate "$(share 2)" 10 "$program" validate --quick --json out/v.json --report out/page
   if command -v Xvfb > /dev/null; then
     exec {said}<> <(:)
     Xvfb -displayfd "$said" -screen 0 800x600x24 > xvfb.log 2>&1 &
     display=$!
     read -r -t 20 -u "$said" number && export DISPLAY=:$number
-    mode view "$(share 5)" "$program" view small.toml --frames 4 --out out/frames --record out/r.rec
+    mode view "$(share 2)" "$program" view small.toml --frames 4 --out out/frames --record out/r.rec
     kill "$display"
   else
     echo "view: skipped, there is no Xvfb"

@@ -73,6 +73,8 @@ const Broken broken[] = {
     {"same-name", "8:1", "line 2", "name of its own"},
     {"name-missing", "2:1", "'name' is missing", "add name"},
     {"name-empty", "3:1", "empty", "letters"},
+    {"name-blank", "3:1", "empty", "letters"},
+    {"name-turned", "3:1", "'muscle?' is empty, too long or not printable", "letters"},
     {"mesh-missing", "4:1", "does not exist", "relative to the folder"},
     {"mesh-is-folder", "4:1", "folder", "name a file"},
     {"radius-text", "3:1", "a string", "e.g. 2"},

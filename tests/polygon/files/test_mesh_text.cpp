@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -128,6 +129,54 @@ TEST_F(MeshText, WhatStandsInPlaceOfAMeshIsToldForWhatItIs) {
   }
   for (const std::string name : {"a.obj", "a.ply", "a.stl", "a.off"})
     EXPECT_NE(refused(name, std::string("\xFF\xFEv\0 \0", 6)).find("UTF-16"), std::string::npos) << name;
+}
+
+TEST_F(MeshText, FilesOfOtherFormatsAreToldForWhatTheyAre) {
+  const std::string padding(200, ' ');
+  const std::string gzip = std::string("\x1F\x8B\x08\0", 4) + padding;
+  for (const std::string name : {"b.obj", "b.ply", "b.stl", "b.off"}) {
+    EXPECT_NE(refused(name, gzip).find("packed by gzip; let its name end in .gz, as in " + name + ".gz"),
+              std::string::npos)
+        << name;
+    EXPECT_NE(refused(name, "PK\x03\x04" + padding).find("ZIP file, as 3MF"), std::string::npos) << name;
+    EXPECT_NE(refused(name, "BZh91AY" + padding).find("packed by bzip2"), std::string::npos) << name;
+    EXPECT_NE(refused(name, "glTF\x02" + padding).find("glTF"), std::string::npos) << name;
+    EXPECT_NE(refused(name, "ISO-10303-21;\nHEADER;\n" + padding).find("STEP"), std::string::npos) << name;
+    EXPECT_NE(refused(name, "<?xml version=\"1.0\"?>\n<VTKFile>" + padding).find("XML"), std::string::npos);
+    for (const auto& [true_name, bytes] : tetrahedra()) {
+      const std::string ending = std::filesystem::path(true_name).extension();
+      if (ending == ".obj" || name.ends_with(ending)) continue;
+      EXPECT_NE(refused(name, bytes).find("begins as " + ending + " does; rename it"), std::string::npos)
+          << ending << " in " << name;
+    }
+  }
+  for (const std::string name : {"c.obj", "c.off"})
+    EXPECT_NE(refused(name, std::string("\0\0\0\1", 4) + padding).find("no text"), std::string::npos) << name;
+}
+
+// Two facets in binary, with 'solid' in the header as many programs write it.
+std::string binary_stl(std::uint32_t announced, const std::string& after) {
+  std::string bytes = "solid by a scanner";
+  bytes.resize(80, ' ');
+  bytes.append(reinterpret_cast<const char*>(&announced), sizeof(announced));
+  for (const float z : {0.0F, 1.0F}) {
+    const float facet[12] = {0, 0, 1, 0, 0, z, 1, 0, z, 0, 1, z};
+    bytes.append(reinterpret_cast<const char*>(facet), sizeof(facet)).append(2, '\0');
+  }
+  return bytes + after;
+}
+
+TEST_F(MeshText, ABinaryStlIsBinaryWhateverItsHeaderAndItsSize) {
+  EXPECT_TRUE(loaded("d.stl", binary_stl(2, "")).findings.empty());
+  const MeshFile longer = loaded("d.stl", binary_stl(2, "COLOR=rgba"));
+  EXPECT_EQ(longer.mesh.triangles.size(), 2U);
+  ASSERT_EQ(longer.findings.size(), 1U);
+  EXPECT_EQ(longer.findings[0].id, "F07-trailing-bytes");
+  EXPECT_EQ(longer.findings[0].count, 10U);
+  EXPECT_EQ(loaded("d.stl", binary_stl(1, "")).mesh.triangles.size(), 1U);
+  EXPECT_NE(refused("d.stl", binary_stl(3, "")).find("announces 3 facets, which need 234 bytes, but has 184"),
+            std::string::npos);
+  EXPECT_NE(refused("d.stl", binary_stl(0, "")).find("no triangle"), std::string::npos);
 }
 
 // A prism of height 10 over an L-shaped base of 700 square units. Each face's list of corners begins at

@@ -73,6 +73,7 @@ struct NiftiFile {
   std::int16_t qform = 0, sform = 1;
   std::uint8_t unit = 2;
   float slope = 0.0F, intercept = 0.0F;
+  glm::vec3 quaternion{0.0F};  // b, c and d
 
   [[nodiscard]] std::string text(const std::string& voxels) const {
     std::string out(352, '\0');
@@ -89,6 +90,7 @@ struct NiftiFile {
     put(123, unit);
     put(252, qform);
     put(254, sform);
+    put(256, std::array<float, 3>{quaternion.x, quaternion.y, quaternion.z});
     put(268, std::array<float, 3>{origin.x, origin.y, origin.z});
     put(280, std::array<float, 12>{voxel, 0, 0, origin.x, 0, voxel, 0, origin.y, 0, 0, voxel, origin.z});
     std::memcpy(&out[344], "n+1", 4);

@@ -203,6 +203,10 @@ TEST_F(VolumeHeaders, UnitsOfNrrdScaleStepsAndPlace) {
                                         "space units: \"pixel\" \"pixel\" \"pixel\"\n");
   expect_base(write("v.nrrd", nrrd_file(no_length)), "pixel");
   EXPECT_SAYS(notes_of(in_folder("v.nrrd")), "'pixel'");
+  const std::string one_unknown =
+      vectors(glm::dvec3(2.0), glm::dvec3(-10, -20, 30), "RAS", "space units: \"mm\" \"mm\" \"furlong\"\n");
+  expect_base(write("v.nrrd", nrrd_file(one_unknown)), "furlong");
+  EXPECT_SAYS(notes_of(in_folder("v.nrrd")), "the unit 'furlong', which is no length known here");
 }
 
 TEST_F(VolumeHeaders, UnitsOfNiftiScaleStepsAndPlace) {
@@ -256,6 +260,16 @@ TEST_F(VolumeHeaders, VoxelSizesOfMetaImage) {
   EXPECT_EQ(notes_of(in_folder("v.mha")), "");
 }
 
+TEST_F(VolumeHeaders, AMetaImageWithoutSizesOrTypeIsRefused) {
+  for (const char* field : {"DimSize = 12 10 8\n", "ElementType = MET_UCHAR\n"}) {
+    std::string text = tests::meta_file("");
+    text.erase(text.find(field), std::strlen(field));
+    EXPECT_SAYS(refusal_of(write("v.mha", text)), "before ElementDataFile");
+    text.insert(text.find("LOCAL\n") + 6, field);  // after the last field of the header
+    EXPECT_SAYS(refusal_of(write("v.mha", text)), "before ElementDataFile");
+  }
+}
+
 // ---- NIfTI: codes and scaling
 
 TEST_F(VolumeHeaders, NiftiWithoutQformAndSformIsSaid) {
@@ -269,6 +283,21 @@ TEST_F(VolumeHeaders, NiftiWithoutQformAndSformIsSaid) {
   EXPECT_EQ(notes_of(in_folder("v.nii")), "");
   file.qform = -1;
   EXPECT_SAYS(notes_of(write("v.nii", file.text(tests::base_voxels<std::uint8_t>()))), "unknown");
+}
+
+TEST_F(VolumeHeaders, AQuaternionOfNiftiThatIsNoRotationIsRefused) {
+  NiftiFile file;
+  file.qform = 1;
+  const auto write_it = [&] { return write("v.nii", file.text(tests::base_voxels<std::uint8_t>())); };
+  file.sform = 0;
+  file.quaternion = {1.0F, 1.0F, 1.0F};
+  EXPECT_SAYS(refusal_of(write_it()), "quaternion of length 1.7");
+  file.quaternion = {0.0F, 0.0F, 1.00005F};  // half a turn about z, up to rounding
+  EXPECT_EQ(refusal_of(write_it()), "");
+  file.quaternion = {1.0F, 1.0F, 1.0F};
+  file.sform = 1;  // the one that is used
+  expect_base(write_it(), "sform");
+  EXPECT_SAYS(notes_of(in_folder("v.nii")), "different places");
 }
 
 TEST_F(VolumeHeaders, ASlopeOfZeroScalesNothing) {
