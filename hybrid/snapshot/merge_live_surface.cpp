@@ -86,12 +86,8 @@ void merge_live_surface(const DrawnScene& scene, const Snapshot& snapshot, const
     if (dent.count == 0) return;
     for (std::size_t v = 0; v < at_rest_m.size(); ++v) moved[v] = dent.at(at_rest_m[v]);
   };
-  const auto lay_relaxed = [&](std::size_t o, const MovedSurfaces& of_thread,
-                               std::span<const glm::dvec3> at_rest_m, std::vector<glm::vec3>& moved) {
-    if (o >= of_thread.size() || of_thread[o].size() != at_rest_m.size() || at_rest_m.empty()) return;
-    moved = of_thread[o];
-    if (o < shown.patches.size() && !shown.patches[o].at_rest_m.empty())
-      lay_patch(at_rest_m, shown.patches[o], moved);
+  const auto has = [](const MovedSurfaces& moved, std::size_t o, std::size_t points) {
+    return o < moved.size() && points > 0 && moved[o].size() == points;
   };
   const bool answered_in_tick = asked != nullptr && shown.asked.number == asked->number;
   if (!answered_in_tick) shown.asked.moved_m.clear();
@@ -101,11 +97,17 @@ void merge_live_surface(const DrawnScene& scene, const Snapshot& snapshot, const
     const bool dented = o < shown.dents.size() && shown.dents[o].used;
     const auto& at_rest = scene.objects[o].surface.vertices;
     if (dented) lay_dent(shown.dents[o], at_rest, shown.soft_moved_m[o]);
-    lay_relaxed(o, relaxed.surfaces, at_rest, shown.soft_moved_m[o]);
+    if (has(relaxed.surfaces, o, at_rest.size())) {
+      shown.soft_moved_m[o] = relaxed.surfaces[o];
+      if (o < shown.patches.size() && !shown.patches[o].at_rest_m.empty())
+        lay_patch(at_rest, shown.patches[o], shown.soft_moved_m[o]);
+    }
     if (asked == nullptr || o >= asked->at_rest_m.size()) continue;
-    if (dented) lay_dent(shown.dents[o], asked->at_rest_m[o], shown.asked.moved_m[o]);
-    if (relaxed.asked.number == asked->number)
-      lay_relaxed(o, relaxed.asked.moved_m, asked->at_rest_m[o], shown.asked.moved_m[o]);
+    const std::vector<glm::dvec3>& points = asked->at_rest_m[o];
+    if (dented) lay_dent(shown.dents[o], points, shown.asked.moved_m[o]);
+    // All of one state, although it may be some ticks old: strain is made of differences.
+    if (relaxed.asked.number == asked->number && has(relaxed.asked.moved_m, o, points.size()))
+      shown.asked.moved_m[o] = relaxed.asked.moved_m[o];
   }
 }
 
