@@ -142,7 +142,7 @@ void HostedSession::publish() {
 }
 
 bool HostedSession::take_surfaces() {
-  return surfaces_->take([this] { return relaxation_thread_ ? &relaxation_thread_->surfaces() : nullptr; });
+  return surfaces_->take([this] { return relaxation_thread_ ? &relaxation_thread_->tissue() : nullptr; });
 }
 
 bool HostedSession::edit(const hybrid::Edit& edit) noexcept {

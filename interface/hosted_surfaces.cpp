@@ -52,15 +52,16 @@ void HostedSurfaces::publish(const hybrid::World& world, const hybrid::WorldStat
   published_.publish();
 }
 
-bool HostedSurfaces::take(const std::function<const hybrid::MovedSurfaces*()>& relaxed) {
+bool HostedSurfaces::take(const std::function<const hybrid::RelaxedTissue*()>& relaxed) {
   const auto& [newest, number] = published_.take();
   if (number == taken_number_) {
     changed_.assign(changed_.size(), false);
     return false;
   }
   hybrid::Snapshot shown;
-  const hybrid::MovedSurfaces* const of_thread = relaxed();
-  hybrid::merge_live_surface(drawn_, newest, of_thread ? *of_thread : hybrid::MovedSurfaces{}, shown);
+  const hybrid::RelaxedTissue* const of_thread = relaxed();
+  hybrid::merge_live_surface(drawn_, newest, of_thread ? *of_thread : hybrid::RelaxedTissue{}, nullptr,
+                             shown);
   const hybrid::Snapshot before = taken_ ? std::move(*taken_) : hybrid::Snapshot{};
   for (std::size_t o = 0; o < changed_.size(); ++o) changed_[o] = differ(o, before, shown);
   taken_ = std::move(shown);

@@ -32,7 +32,7 @@ class HostedSurfaces {
   // ---- reader ----
   // Takes the newest published surfaces; false if there are none that are newer. `relaxed` returns the
   // surfaces of the relaxation thread, or null. It is called only after a publish().
-  bool take(const std::function<const hybrid::MovedSurfaces*()>& relaxed);
+  bool take(const std::function<const hybrid::RelaxedTissue*()>& relaxed);
   // The snapshot that was taken last; empty before the first one.
   [[nodiscard]] const hybrid::Snapshot* taken() const noexcept { return taken_ ? &*taken_ : nullptr; }
   // Did the object's surface change with the snapshot that was taken last?

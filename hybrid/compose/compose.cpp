@@ -289,6 +289,9 @@ Composed compose(const ComposeOptions& options, const Progress& progress) {
                       parts, progress);
     }
   }
+  if (!scans.empty()) {
+    for (SoftPart& part : parts.soft) part.scan = fs::absolute(scans[0]);
+  }
   SceneSettings settings = default_settings(parts);
   settings.title = stem_of(options.labels.empty() ? options.inputs.front()
                            : scans.empty()        ? options.labels

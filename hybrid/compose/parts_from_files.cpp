@@ -159,6 +159,7 @@ void add_intensities(const std::filesystem::path& file, const std::string& name,
   SoftPart part{
       .name = name,
       .file = name + ".nii.gz",
+      .scan = std::filesystem::absolute(file),
       .materials = {{1, &tissue}},
       .label_names = {{1, name}},
       .anchor_bottom = true,

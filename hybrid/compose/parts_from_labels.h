@@ -34,6 +34,7 @@ struct RigidPart {
 
 struct SoftPart {
   std::string name{}, file{};
+  std::filesystem::path scan{};              // with the grey values; empty: not known
   std::map<int, const Tissue*> materials{};  // key: label in the file
   std::map<int, std::string> label_names{};  // the same keys
   std::set<int> anchor_labels{};

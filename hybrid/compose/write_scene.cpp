@@ -154,6 +154,9 @@ void add_soft(std::string& text, const SceneParts& parts, const MaterialNames& n
     if (!part.comment.empty()) text += fmt::format("# {}\n", plain(part.comment));
     text += fmt::format("[[soft]]\nname = {}\nvolume = {}\nlargest = false\n", quoted(part.name),
                         quoted(part.file));
+    if (!part.scan.empty())
+      text += fmt::format("scan = {} # its grey values are for slices in `hybrid view`\n",
+                          quoted(part.scan.string()));
     const bool alone = part.materials.size() == 1;
     if (alone) {
       text += fmt::format("material = {}\n", quoted(names.of(o, part.materials.begin()->first)));

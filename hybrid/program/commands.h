@@ -31,12 +31,15 @@ struct RunCommand {
   std::uint64_t start_ticks = 0;
   // Where tissue away from the contact is relaxed: "apart" (on a thread of its own) or "tick".
   std::string relaxation = "apart";
-  std::filesystem::path trace, plot, picture, record, save_surface, save_volume;  // empty: not written
-  std::filesystem::path black_box;  // empty: see open_black_box_file()
+  std::filesystem::path trace, plot, picture, video, record, save_surface, save_volume;  // empty: not written
+  std::string colour = "displacement";  // of tissue in picture and video (TissueColour)
+  std::filesystem::path black_box;      // empty: see open_black_box_file()
   ReportRequest report;
   std::string json;  // "-": standard output
 };
 int run(const RunCommand& command);
+// Names for RunCommand::colour.
+[[nodiscard]] std::vector<std::string> tissue_colours();
 
 struct ReplayCommand {
   std::filesystem::path recording;

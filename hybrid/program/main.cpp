@@ -63,6 +63,10 @@ void add_run(CLI::App& app, int& status) {
   sub->add_option("--trace", c->trace, "write every tick as CSV");
   sub->add_option("--plot", c->plot, "write force over time with contacts as SVG");
   sub->add_option("--picture", c->picture, "write a picture of the moment with the most contact as PNG");
+  auto* video = sub->add_option("--video", c->video,
+                                "write the session as a video (.mp4, .mkv, .webm; needs the program ffmpeg)");
+  auto* colour = sub->add_option("--colour", c->colour, "what colours tissue in picture and video");
+  colour->check(CLI::IsMember(hybrid::tissue_colours()))->capture_default_str();
   sub->add_option("--record", c->record, "write a recording for `hybrid replay`");
   sub->add_option("--black-box", c->black_box,
                   "where the 2 s around the first fault go; default in real time: SCENE-fault.csv here");
@@ -72,7 +76,11 @@ void add_run(CLI::App& app, int& status) {
                   "write each soft object's displacement and moved labels (.nii.gz, .nrrd, .mha)");
   hybrid::add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
-  sub->callback([c, samples, reference, &status] {
+  sub->callback([c, samples, reference, video, colour, &status] {
+    if (video->count() > 0 && c->realtime)
+      throw CLI::ValidationError("--video", "cannot be drawn in real time; leave out --realtime");
+    if (colour->count() > 0 && c->picture.empty() && c->video.empty())
+      throw CLI::ValidationError("--colour", "has no effect without --picture or --video");
     if (samples->count() > 0 && c->samples > 0 && c->realtime)
       throw CLI::ValidationError("--samples", "has no effect with --realtime; leave one of them out");
     if (reference->count() > 0 && (c->realtime || c->samples == 0))

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
+#include <stdexcept>
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/file_ending.h"
@@ -16,6 +19,7 @@
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/program/run_page.h"
+#include "hybrid/program/viewed_scene.h"
 #include "hybrid/session/export_shapes.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/session/recording.h"
@@ -25,7 +29,10 @@
 #include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/view/glb_file.h"
+#include "hybrid/view/layout.h"
 #include "hybrid/view/picture.h"
+#include "hybrid/view/tissue_view.h"
+#include "hybrid/window/video.h"
 
 namespace hybrid {
 namespace {
@@ -49,6 +56,8 @@ void ask_outputs(const RunCommand& command, const Scene& scene, Outputs& outputs
   outputs.ask("--trace", command.trace, {".csv", ".txt"});
   outputs.ask_plot(command.plot);
   outputs.ask("--picture", command.picture, {".png"});
+  outputs.ask("--video", command.video, {".mp4", ".mkv", ".webm"});
+  if (!command.video.empty()) require_ffmpeg();
   require_ending_of_none("--record", command.record);
   outputs.ask("--record", command.record, {});
   outputs.ask("--save-surface", command.save_surface, {".ply", ".stl", ".obj", ".glb"});
@@ -61,7 +70,52 @@ void ask_outputs(const RunCommand& command, const Scene& scene, Outputs& outputs
   outputs.ask_json(command.json);
 }
 
+ViewSettings view_of(const RunCommand& command) {
+  ViewSettings view;
+  view.colour = tissue_colour_named(command.colour).value_or(TissueColour::displacement);
+  return view;
+}
+
+// The session as a video. Drawing begins with the first frame; an error ends it and is kept until keep().
+class RunVideo {
+ public:
+  RunVideo(const std::filesystem::path& file, const DrawnScene& drawn, const ViewSettings& view)
+      : file_(file), drawn_(drawn) {
+    options_.view = view;
+  }
+  void add(const Snapshot& snapshot) noexcept {
+    if (why_not_) return;
+    try {
+      if (!maker_) {
+        const double aspect = frame_layout(options_.width, options_.height, false).aspect();
+        options_.camera = frame_scene(drawn_, snapshot, aspect, drawn_.path_m);
+        maker_.emplace(drawn_, options_.height);
+        video_.emplace(file_, options_.width, options_.height, static_cast<int>(kFrames_per_s));
+      }
+      video_->add(options_.width, options_.height, maker_->draw(snapshot, options_));
+    } catch (...) {
+      why_not_ = std::current_exception();
+    }
+  }
+  void keep() {
+    if (why_not_) std::rethrow_exception(why_not_);
+    if (video_) video_->keep();
+  }
+
+ private:
+  std::filesystem::path file_;
+  const DrawnScene& drawn_;
+  PictureOptions options_;
+  std::optional<PictureMaker> maker_;
+  std::optional<VideoFile> video_;
+  std::exception_ptr why_not_;
+};
+
 }  // namespace
+
+std::vector<std::string> tissue_colours() {
+  return {kTissueColours.begin(), kTissueColours.end()};
+}
 
 Progress progress_on_terminal() {
   const auto start = std::chrono::steady_clock::now();
@@ -136,6 +190,21 @@ int run(const RunCommand& command) {
                          .progress = progress,
                          .async_relaxation = command.relaxation == "apart",
                          .black_box = kept ? &kept->box() : nullptr};
+  const std::string title = scene.title.empty() ? command.scene.stem().string() : scene.title;
+  std::optional<DrawnScene> drawn;
+  std::optional<RunVideo> video;
+  if (!command.picture.empty() || !command.video.empty()) {
+    drawn = drawn_scene(scene, built, title);
+    TissueView tissue(*drawn, glm::dvec3(0.0));
+    tissue.set(view_of(command));
+    options.picture_points = tissue.asked();
+  }
+  if (!command.video.empty()) {
+    if (real) throw std::runtime_error("--video needs a simulated device; add --device premium-1.5");
+    drawn->path_m = places_along(*scene_path(scene));
+    video.emplace(command.video, *drawn, view_of(command));
+    options.on_frame = [&video](const Snapshot& snapshot) { video->add(snapshot); };
+  }
   SessionResult result = run_session(scene, built, options);
   end_progress();
   const int signal = result.end == device::ServoEnd::stopped ? device::stop_signal() : 0;
@@ -144,7 +213,6 @@ int run(const RunCommand& command) {
   });
 
   using Path = std::filesystem::path;
-  const std::string title = scene.title.empty() ? command.scene.stem().string() : scene.title;
   outputs.write("trace", command.trace, [&](const Path& file) {
     save_trace(file, result.rows, pair_columns(*built.world, result.between));
   });
@@ -172,8 +240,11 @@ int run(const RunCommand& command) {
     for (const Path& file : save_volumes(command.save_volume, scene, built)) outputs.wrote("volume", file);
   });
   outputs.write("picture", command.picture, [&](const Path& file) {
-    save_picture(file, drawn_scene(scene, built, title), *result.moment);
+    PictureOptions picture;
+    picture.view = view_of(command);
+    save_picture(file, *drawn, *result.moment, picture);
   });
+  outputs.write("video", command.video, [&](const Path&) { video->keep(); });
   outputs.attempt([&] {
     if (paged) write_report(outputs, command.report, run_page(scene, built, result, report, title), report);
   });

@@ -41,6 +41,7 @@ PlayRequest request_of(const WindowInput& input) {
           .speed = input.speed,
           .restarts = input.restarts,
           .single_ticks = input.single_ticks,
+          .asked = input.asked,
           .goal_m = input.dragged_goal_m.value_or(glm::dvec3(0.0))};
 }
 
@@ -103,7 +104,7 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
       }
       player.step(request);
     }
-    player.snapshot(snapshot);
+    player.snapshot(snapshot, input.asked.get());
     snapshot.presses = input.wants_presses ? player.presses() : std::vector<PairPress>();
     meter.end_session();
     window.add_ticks(player.samples());
@@ -141,11 +142,13 @@ class LiveSession {
   ~LiveSession() { stop(); }
 
   void ask(const PlayRequest& request) {
+    asked_ = request.asked;
     requests_.back() = request;
     requests_.publish();
   }
   void shown(const DrawnScene& drawn, Snapshot& snapshot) {
-    merge_live_surface(drawn, snapshots_.take(), relaxation_->surfaces(), snapshot);
+    relaxation_->ask(asked_);
+    merge_live_surface(drawn, snapshots_.take(), relaxation_->tissue(), asked_.get(), snapshot);
   }
   // Waits until the servo thread leaves the state alone. Returns false if it does not answer.
   bool hold(PlayRequest request) {
@@ -182,7 +185,7 @@ class LiveSession {
     if (ticked && now < next_) return;
     next_ = now + std::chrono::microseconds(static_cast<int>(1e6 * kSnapshotEvery_s));
     player_.shown();
-    player_.snapshot(snapshots_.back());
+    player_.snapshot(snapshots_.back(), requests_.take().asked.get());
     snapshots_.publish();
   }
   void serve() {
@@ -203,6 +206,7 @@ class LiveSession {
   BlackBox& box_;
   TripleBuffer<Snapshot> snapshots_;
   TripleBuffer<PlayRequest> requests_;
+  std::shared_ptr<const AskedPoints> asked_;  // of the last request
   std::atomic<bool> stop_{false}, ended_{false};
   std::chrono::steady_clock::time_point next_{};
   std::uint32_t holds_ = 0;

@@ -14,14 +14,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{300};  // time between two looks at the scene's file
 
-// Positions of the hand along the whole path.
-std::vector<glm::dvec3> places_along(const device::Path& path) {
-  constexpr int steps = 500;
-  std::vector<glm::dvec3> places;
-  for (int n = 0; n <= steps; ++n) places.push_back(path.position(path.duration_s() * n / steps));
-  return places;
-}
-
 std::unique_ptr<ViewedScene> load_anew(const ViewCommand& command) {
   auto viewed = read_viewed_scene(command);
   if (viewed->scene.real_device)
@@ -32,6 +24,13 @@ std::unique_ptr<ViewedScene> load_anew(const ViewCommand& command) {
 }
 
 }  // namespace
+
+std::vector<glm::dvec3> places_along(const device::Path& path) {
+  constexpr int steps = 500;
+  std::vector<glm::dvec3> places;
+  for (int n = 0; n <= steps; ++n) places.push_back(path.position(path.duration_s() * n / steps));
+  return places;
+}
 
 std::string text_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);

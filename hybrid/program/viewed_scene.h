@@ -22,6 +22,8 @@ struct ViewedScene {
   std::unique_ptr<Player> player;  // null until the session begins
 };
 
+// Positions of the hand along the whole path (m).
+[[nodiscard]] std::vector<glm::dvec3> places_along(const device::Path& path);
 // Content of a text file. Throws std::runtime_error if it is not readable.
 [[nodiscard]] std::string text_of(const std::filesystem::path& file);
 

@@ -125,6 +125,10 @@ VolumeSource read_volume(const TableReader& table) {
   if (table.has("spacing")) out.spacing_m = table.number_or_vector("spacing", table.source().size());
   out.largest = table.boolean("largest", out.largest);
   if (table.has("unit")) out.unit_m = table.unit("unit", 1e-3);
+  if (table.has("scan")) {
+    const std::filesystem::path scan = table.text("scan", "");
+    out.scan = scan.is_relative() ? table.source().file.parent_path() / scan : scan;
+  }
   return out;
 }
 
@@ -244,17 +248,17 @@ SoftSource read_source(const TableReader& table, std::string_view kind) {
       "name",    "mesh",   "unit",     "repair", "spacing",  "energy",   "material", "materials",
       "anchors", "budget", "thinning", "model",  "position", "rotation", "transform"};
   static constexpr std::string_view of_volume[] = {
-      "name",    "volume",   "unit",   "labels",   "range",     "ranges",
-      "largest", "spacing",  "energy", "material", "materials", "anchors",
-      "budget",  "thinning", "model",  "position", "rotation",  "transform"};
+      "name",     "volume",  "unit",     "labels",   "range",     "ranges",  "largest",
+      "scan",     "spacing", "energy",   "material", "materials", "anchors", "budget",
+      "thinning", "model",   "position", "rotation", "transform"};
   static constexpr std::string_view of_block[] = {
       "name",      "formula", "size",   "spacing",  "label", "layers",   "inclusions", "energy",   "material",
       "materials", "anchors", "budget", "thinning", "model", "position", "rotation",   "transform"};
   static constexpr std::string_view of_ball[] = {
       "name",      "formula", "size",   "spacing",  "label", "inclusions", "energy",   "material",
       "materials", "anchors", "budget", "thinning", "model", "position",   "rotation", "transform"};
-  static constexpr std::string_view any[] = {"unit",    "repair", "labels", "range",  "ranges",
-                                             "largest", "size",   "label",  "layers", "inclusions"};
+  static constexpr std::string_view any[] = {"unit", "repair", "labels", "range",  "ranges",    "largest",
+                                             "scan", "size",   "label",  "layers", "inclusions"};
   static constexpr std::string_view shapes[] = {"block", "ball"};
   if (kind == "mesh") {
     table.allow(of_mesh, {}, any, "mesh");
@@ -281,9 +285,9 @@ std::optional<Energy> read_energy(const TableReader& table) {
 
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number) {
   static constexpr std::string_view all[] = {
-      "name",   "mesh",     "volume", "formula", "unit",     "repair",     "spacing",  "labels",    "range",
-      "ranges", "largest",  "size",   "label",   "layers",   "inclusions", "material", "materials", "anchors",
-      "budget", "thinning", "energy", "model",   "position", "rotation",   "transform"};
+      "name",    "mesh",    "volume",   "formula", "unit",  "repair",   "spacing",    "labels",   "range",
+      "ranges",  "largest", "scan",     "size",    "label", "layers",   "inclusions", "material", "materials",
+      "anchors", "budget",  "thinning", "energy",  "model", "position", "rotation",   "transform"};
   static constexpr std::string_view sources[] = {"volume", "mesh", "formula"};
   static constexpr std::string_view models[] = {"voxels", "proxy", "auto"};
   const TableReader reader = object_table(source, table, "[[soft]]", number);

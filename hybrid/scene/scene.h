@@ -158,6 +158,9 @@ struct VolumeSource {
   bool largest = true;  // keep only the largest connected piece
   // Length unit of the file's numbers; default: the unit that the file's header states, otherwise mm.
   std::optional<double> unit_m;
+  // File with the grey values of the same place, in the same frame. Only pictures use it, and it need not
+  // exist.
+  std::optional<std::filesystem::path> scan{};
 };
 struct ClosedMeshSource {
   MeshSource mesh;

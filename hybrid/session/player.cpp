@@ -23,6 +23,10 @@ TickSample sample_of(const TickResult& felt, double t_s, double late_s, double d
           .total_N = static_cast<float>(glm::length(felt.force_N)),
           .rigid_N = static_cast<float>(glm::length(felt.rigid_N)),
           .soft_N = static_cast<float>(glm::length(felt.soft_N)),
+          .friction_N = static_cast<float>(glm::length(felt.friction_N)),
+          .damping_N = static_cast<float>(glm::length(felt.damping_N)),
+          .limits_N = static_cast<float>(glm::length(felt.limits_N)),
+          .passivity_N = static_cast<float>(glm::length(felt.passivity_N)),
           .tick_us = static_cast<float>(felt.tick_us),
           .stage_us = felt.stage_us,
           .late = late_s >= dt_s};
@@ -136,7 +140,7 @@ void Player::step(const PlayRequest& request) {
   if (advance(request, {.device = device_.read(), .dt_s = dt_s_})) device_.write(felt_.force_N, dt_s_);
 }
 
-void Player::snapshot(Snapshot& out) const {
+void Player::snapshot(Snapshot& out, const AskedPoints* asked) const {
   out.tick = built_.state->tick;
   out.t_s = t_s();
   out.device_m = felt_.device_m;
@@ -150,6 +154,7 @@ void Player::snapshot(Snapshot& out) const {
   } else {
     fill_moved(*built_.world, *built_.state, out);
   }
+  if (asked != nullptr) fill_asked(*built_.world, *built_.state, *asked, live_, out);
 }
 
 std::vector<PairPress> Player::presses() const {

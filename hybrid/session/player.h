@@ -26,7 +26,9 @@ struct PlayRequest {
   double speed = 1.0;              // simulated time over real time, 0 to 1; always 1 with a real device
   std::uint32_t restarts = 0;      // counts restarts of the hand's path
   std::uint32_t single_ticks = 0;  // counts single steps while paused
-  glm::dvec3 goal_m{0.0};          // position to which the mouse drags the tool; scene's frame
+  // Points whose displacements the snapshots carry; may be null.
+  std::shared_ptr<const AskedPoints> asked{};
+  glm::dvec3 goal_m{0.0};  // position to which the mouse drags the tool; scene's frame
 };
 
 // Target of the simulated hand: the scene's path, or the goal of the mouse. The device reads it within a
@@ -69,8 +71,8 @@ class Player {
   // Takes edits, and does one tick if one is due. Returns true if there was a tick.
   bool advance(const PlayRequest& request, const device::ServoInput& input) noexcept;
   [[nodiscard]] const TickResult& felt() const noexcept { return felt_; }
-  // Fills the snapshot of this moment, from within the servo loop.
-  void snapshot(Snapshot& out) const;
+  // Fills the snapshot of this moment, from within the servo loop. `asked`: as of PlayRequest.
+  void snapshot(Snapshot& out, const AskedPoints* asked = nullptr) const;
   // Were edits taken since the last snapshot?
   [[nodiscard]] bool edited() const noexcept { return edited_; }
   void shown() noexcept { edited_ = false; }

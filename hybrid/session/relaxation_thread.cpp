@@ -32,19 +32,28 @@ bool RelaxationThread::relax_submitted() noexcept {
 }
 
 // Reads only the thread's own state, which the tick never writes.
-void RelaxationThread::publish_surfaces() {
-  MovedSurfaces& moved = surfaces_.back();
-  moved.resize(world_.object_count());
+void RelaxationThread::publish_tissue() {
+  RelaxedTissue& tissue = tissue_.back();
+  const AskedPoints* const asked = asked_.take().get();
+  tissue.surfaces.resize(world_.object_count());
+  tissue.asked.moved_m.resize(world_.object_count());
+  tissue.asked.number = asked != nullptr ? asked->number : 0;
   for (std::size_t o = 0; o < world_.soft.size(); ++o) {
     if (!async_.has(o)) continue;
     const SoftBody& body = world_.soft[o];
-    auto& of_object = moved[world_.rigid.size() + o];
-    of_object.resize(body.drawn.vertices.size());
-    for (std::size_t v = 0; v < of_object.size(); ++v)
-      of_object[v] =
-          glm::vec3(body.pose.rotation * async_.objects[o]->shadow.displacement_at(body.drawn.vertices[v]));
+    const std::size_t number = world_.rigid.size() + o;
+    const auto displacement_at = [&](const glm::dvec3& in_body) {
+      return glm::vec3(body.pose.rotation * async_.objects[o]->shadow.displacement_at(in_body));
+    };
+    auto& surface = tissue.surfaces[number];
+    surface.resize(body.drawn.vertices.size());
+    for (std::size_t v = 0; v < surface.size(); ++v) surface[v] = displacement_at(body.drawn.vertices[v]);
+    auto& points = tissue.asked.moved_m[number];
+    points.clear();
+    if (asked == nullptr || number >= asked->at_rest_m.size()) continue;
+    for (const glm::dvec3& at : asked->at_rest_m[number]) points.push_back(displacement_at(body.to_body(at)));
   }
-  surfaces_.publish();
+  tissue_.publish();
 }
 
 void take_ordinary_priority() noexcept {
@@ -60,7 +69,7 @@ void RelaxationThread::run() {
   while (!stop_.load(std::memory_order_relaxed)) {
     const bool any = relax_submitted();
     if (surfaces_hz_ > 0.0 && Clock::now() >= next) {
-      publish_surfaces();
+      publish_tissue();
       next = Clock::now() +
              std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / surfaces_hz_));
     }

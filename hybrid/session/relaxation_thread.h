@@ -3,7 +3,9 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 #include <thread>
+#include <utility>
 
 #include "hybrid/base/triple_buffer.h"
 #include "hybrid/snapshot/snapshot.h"
@@ -30,18 +32,24 @@ class RelaxationThread {
 
   // Processor time of this thread so far (s).
   [[nodiscard]] double busy_s() const { return busy_s_.load(std::memory_order_relaxed); }
-  // The latest surfaces. Only one other thread may take them: the one that draws.
-  [[nodiscard]] const MovedSurfaces& surfaces() noexcept { return surfaces_.take(); }
+  // The latest surfaces, and displacements at the points that were asked for. Only one other thread may call
+  // these two: the one that draws. `points`: null for none.
+  [[nodiscard]] const RelaxedTissue& tissue() noexcept { return tissue_.take(); }
+  void ask(std::shared_ptr<const AskedPoints> points) {
+    asked_.back() = std::move(points);
+    asked_.publish();
+  }
 
  private:
   void run();
   bool relax_submitted() noexcept;
-  void publish_surfaces();
+  void publish_tissue();
 
   const World& world_;
   AsyncRelaxation& async_;
   double surfaces_hz_;
-  TripleBuffer<MovedSurfaces> surfaces_;
+  TripleBuffer<RelaxedTissue> tissue_;
+  TripleBuffer<std::shared_ptr<const AskedPoints>> asked_;
   std::atomic<bool> stop_{false};
   std::atomic<double> busy_s_{0.0};
   std::thread thread_;

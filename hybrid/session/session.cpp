@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 
 #include "device/loop/stop_signal.h"
 #include "device/simulated/simulated.h"
@@ -188,6 +187,7 @@ class Run {
     } else {
       if (course_ != nullptr) keep_in_course(felt);
       if (options_.keep_picture && tick % kMomentEvery == 0) maybe_keep_snapshot(felt, tick);
+      if (options_.on_frame && static_cast<double>(tick) * dt_ >= next_frame_s_) show_frame(felt, tick);
       if (options_.keep_clearance && tick % clearance_every_ == 0) measure_clearance(tick);
       if (between_every_ > 0 && tick % between_every_ == 0) measure_between(tick);
       if (options_.progress && tick % 64 == 0) report_progress(tick);
@@ -282,11 +282,21 @@ class Run {
     keep_moment(felt, tick);
   }
 
-  void keep_moment(const TickResult& felt, std::uint64_t tick) {
-    result_.moment = take_snapshot(world_, state_, felt, static_cast<double>(tick) * dt_);
-    result_.moment->presses = pair_presses(world_, state_);
+  [[nodiscard]] Snapshot snapshot_of(const TickResult& felt, std::uint64_t tick) const {
+    Snapshot snapshot = take_snapshot(world_, state_, felt, static_cast<double>(tick) * dt_);
+    if (options_.picture_points) fill_asked(world_, state_, *options_.picture_points, false, snapshot);
+    snapshot.presses = pair_presses(world_, state_);
+    return snapshot;
   }
 
+  void keep_moment(const TickResult& felt, std::uint64_t tick) { result_.moment = snapshot_of(felt, tick); }
+
+  void show_frame(const TickResult& felt, std::uint64_t tick) {
+    next_frame_s_ += 1.0 / kFrames_per_s;
+    options_.on_frame(snapshot_of(felt, tick));
+  }
+
+  double next_frame_s_ = 0.0;
   const Scene& scene_;
   const World& world_;
   WorldState& state_;
@@ -430,21 +440,6 @@ std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept
         [&hash](float u) { hash = hash_in(hash, std::bit_cast<std::uint32_t>(u)); });
   }
   return hash;
-}
-
-Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s) {
-  Snapshot snapshot{.tick = state.tick,
-                    .t_s = t_s,
-                    .device_m = tick.device_m,
-                    .proxy_m = tick.proxy_m,
-                    .force_N = tick.force_N,
-                    .feel = state.feel,
-                    .soft_moved_m = {},
-                    .rigid_place = {},
-                    .tick_us = tick.tick_us};
-  fill_moved(world, state, snapshot);
-  fill_inside(world, state, snapshot);
-  return snapshot;
 }
 
 }  // namespace hybrid

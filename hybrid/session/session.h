@@ -41,6 +41,8 @@ struct RecordedTick {
 // and the work budget.
 void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept;
 
+inline constexpr double kFrames_per_s = 30.0;  // of a session's video
+
 struct SessionOptions {
   std::optional<double> seconds;  // default: length of the path plus half a second; a real device: a minute
   bool realtime = false;          // true: paced by a real timer. False: fixed-step, as fast as possible
@@ -56,6 +58,10 @@ struct SessionOptions {
   int between_samples = 0;
   bool between_every_tick = false;  // at every tick instead, and keep each pair's force; not in real time
   bool keep_picture = false;        // keep the snapshot with the most contact
+  std::shared_ptr<const AskedPoints> picture_points{};  // points whose displacements snapshots carry
+  // Called kFrames_per_s times a second of the session, by the thread that runs it; not in real time. Must
+  // not throw.
+  std::function<void(const Snapshot&)> on_frame{};
   // Greatest number of ticks, evenly spread, whose forces are compared with those of a slow run
   // (force_error.h), and how carefully that run is played. In real time nothing is compared.
   int reference_samples = 0;
@@ -135,8 +141,5 @@ BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& fel
 inline constexpr std::uint64_t kHashBegin = 0xCBF29CE484222325ULL;
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;
-
-// The snapshot of this moment.
-Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s);
 
 }  // namespace hybrid

@@ -65,6 +65,23 @@ void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot)
     fill_surface(world.soft[o], *state.soft[o], snapshot.soft_moved_m[world.rigid.size() + o]);
 }
 
+void fill_asked(const World& world, const WorldState& state, const AskedPoints& asked, bool in_tick,
+                Snapshot& snapshot) {
+  snapshot.asked.number = asked.number;
+  snapshot.asked.moved_m.resize(world.object_count());
+  for (auto& moved : snapshot.asked.moved_m) moved.clear();
+  for (std::size_t o = 0; o < world.soft.size(); ++o) {
+    const voxel::SoftObject& object = *state.soft[o];
+    const std::size_t number = world.rigid.size() + o;
+    if (number >= asked.at_rest_m.size() || (in_tick && (object.uses_patches() || state.async.has(o))))
+      continue;
+    const SoftBody& body = world.soft[o];
+    for (const glm::dvec3& at : asked.at_rest_m[number])
+      snapshot.asked.moved_m[number].emplace_back(body.pose.rotation *
+                                                  object.displacement_at(body.to_body(at)));
+  }
+}
+
 void fill_values(const World& world, const WorldState& state, const DrawnScene& drawn, Snapshot& snapshot) {
   snapshot.values.resize(drawn.editable.size());
   for (std::size_t n = 0; n < drawn.editable.size(); ++n) {
@@ -132,6 +149,21 @@ void fill_moved_near(const World& world, const WorldState& state, Snapshot& snap
       patch.moved_m.emplace_back(body.pose.rotation * object.displacement(v));
     }
   }
+}
+
+Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s) {
+  Snapshot snapshot{.tick = state.tick,
+                    .t_s = t_s,
+                    .device_m = tick.device_m,
+                    .proxy_m = tick.proxy_m,
+                    .force_N = tick.force_N,
+                    .feel = state.feel,
+                    .soft_moved_m = {},
+                    .rigid_place = {},
+                    .tick_us = tick.tick_us};
+  fill_moved(world, state, snapshot);
+  fill_inside(world, state, snapshot);
+  return snapshot;
 }
 
 }  // namespace hybrid

@@ -14,8 +14,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kDrawnPoint = 0.004;           // smallest drawn radius of a tool (unit: the scene's extent)
-constexpr std::size_t kMostInside = 1U << 24U;  // most cells of an object whose inside is kept for a cut
+constexpr double kDrawnPoint = 0.004;  // smallest drawn radius of a tool (unit: the scene's extent)
 
 // The material of most voxels around a vertex. A vertex lies within one cube between eight voxel centres, of
 // which at least one is filled. Ties go to the material that was named first.
@@ -58,61 +57,51 @@ std::vector<double> area_of_materials(const polygon::TriangleMesh& mesh,
   return area;
 }
 
-// Adds the materials voxel by voxel, if the surface hides one of them. `shown`: numbers of the visible
-// materials.
-void add_inside(DrawnObject& drawn, const SoftBody& body, const voxel::Lattice& lattice,
-                const MaterialsOfLabels& materials, const std::vector<std::uint8_t>& shown) {
-  const std::array<int, 3> dims = lattice.grid().dims;
-  const std::size_t cells = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
-                            static_cast<std::size_t>(dims[2]);
-  if (shown.empty() || cells > kMostInside) return;
-  DrawnInside inside{.dims = dims,
-                     .to_scene = glm::mat3_cast(body.pose.rotation),
-                     .origin_m = body.pose.origin,
-                     .spacing_m = lattice.spacing_m()};
-  std::array<std::uint8_t, 256> rank{};  // 0: none yet, else 1 + index into inside.materials
+// Describes the voxels of a soft object. `shown`: numbers of the visible materials.
+void add_inside(DrawnObject& drawn, const SoftBody& body,
+                const std::shared_ptr<const voxel::Lattice>& lattice, const MaterialsOfLabels& materials,
+                const std::vector<std::uint8_t>& shown) {
+  DrawnInside& inside = drawn.inside;
+  inside.lattice = lattice;
+  inside.to_scene = glm::mat3_cast(body.pose.rotation);
+  inside.origin_m = body.pose.origin;
+  std::array<bool, 256> used{};
+  for (voxel::RowId row = 0; row < lattice->size() / voxel::kRow; ++row) {
+    for (int lane = 0; lane < voxel::kRow; ++lane) used[lattice->labels(row)[lane]] = true;
+  }
+  std::array<std::optional<std::uint8_t>, 256> rank{};  // [material] index into inside.materials
   const auto rank_of = [&](std::uint8_t material) {
-    if (rank[material] == 0) {
-      inside.materials.push_back(materials.names[material]);
+    if (!rank[material]) {
       rank[material] = static_cast<std::uint8_t>(inside.materials.size());
+      inside.materials.push_back(materials.names[material]);
     }
-    return rank[material];
+    return *rank[material];
   };
   for (const std::uint8_t material : shown) rank_of(material);
-  inside.of_voxel.reserve(cells);
-  for (int k = 0; k < dims[2]; ++k) {
-    for (int j = 0; j < dims[1]; ++j) {
-      for (int i = 0; i < dims[0]; ++i) {
-        const voxel::VoxelId v = lattice.at(i, j, k);
-        inside.of_voxel.push_back(lattice.filled(v) ? rank_of(materials.of_label[lattice.label(v)])
-                                                    : std::uint8_t{0});
-      }
-    }
+  for (std::size_t label = 1; label < 256; ++label) {
+    if (used[label]) inside.of_label[label] = rank_of(materials.of_label[label]);
   }
-  if (inside.materials.size() > shown.size()) drawn.inside = std::move(inside);
 }
 
 void add_materials(DrawnObject& drawn, const SoftDescription& description, const SoftBody& body,
-                   const voxel::Lattice& lattice) {
+                   const std::shared_ptr<const voxel::Lattice>& lattice) {
   const MaterialsOfLabels materials = materials_of_labels(description, body);
-  const auto only = [&](const std::string& name) { drawn.material = name == kUnnamed ? "" : name; };
-  if (materials.names.size() < 2) {
-    if (!materials.names.empty()) only(materials.names.front());
-    return;
+  std::vector<std::uint8_t> of_vertex(body.drawn.vertices.size(), 0), order;
+  if (materials.names.size() > 1) {
+    for (std::size_t v = 0; v < of_vertex.size(); ++v)
+      of_vertex[v] = material_beneath(*lattice, materials, body.drawn.vertices[v]);
+    const std::vector<double> area = area_of_materials(body.drawn, of_vertex, materials.names.size());
+    for (std::size_t m = 0; m < area.size(); ++m) {
+      if (area[m] > 0.0) order.push_back(static_cast<std::uint8_t>(m));
+    }
+    std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return area[a] > area[b]; });
+  } else if (!materials.names.empty()) {
+    order.push_back(0);
   }
-  std::vector<std::uint8_t> of_vertex;
-  of_vertex.reserve(body.drawn.vertices.size());
-  for (const glm::dvec3& v : body.drawn.vertices)
-    of_vertex.push_back(material_beneath(lattice, materials, v));
-  const std::vector<double> area = area_of_materials(body.drawn, of_vertex, materials.names.size());
-  std::vector<std::uint8_t> order;
-  for (std::size_t m = 0; m < area.size(); ++m) {
-    if (area[m] > 0.0) order.push_back(static_cast<std::uint8_t>(m));
-  }
-  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return area[a] > area[b]; });
   add_inside(drawn, body, lattice, materials, order);
   if (order.size() < 2) {
-    if (!order.empty()) only(materials.names[order.front()]);
+    const std::string name = order.empty() ? "" : materials.names[order.front()];
+    drawn.material = name == kUnnamed ? "" : name;
     return;
   }
   std::array<std::uint8_t, 256> rank{};
@@ -124,18 +113,41 @@ void add_materials(DrawnObject& drawn, const SoftDescription& description, const
   drawn.vertex_material = std::move(of_vertex);
 }
 
+// The scan that a scene names, or the file of an object whose labels are ranges of grey values.
+std::optional<DrawnScan> scan_of(const SoftDescription& description) {
+  const auto* const volume = std::get_if<VolumeSource>(&description.source);
+  if (volume == nullptr) return {};
+  const bool ranges = std::ranges::any_of(
+      volume->rules, [](const voxel::LabelRule& rule) { return rule.lower < rule.upper; });
+  if (!volume->scan && !ranges) return {};
+  return DrawnScan{.file = volume->scan.value_or(volume->file),
+                   .unit_m = volume->scan ? std::nullopt : volume->unit_m,
+                   .to_scene = glm::mat3_cast(description.pose.rotation),
+                   .origin_m = description.pose.position_m};
+}
+
 }  // namespace
 
+glm::dvec3 DrawnInside::to_voxels(const glm::dvec3& at_rest_m) const noexcept {
+  return ((at_rest_m - origin_m) * to_scene) / lattice->spacing_m();  // v · R is Rᵀ v
+}
+
+glm::dvec3 DrawnInside::from_voxels(const glm::dvec3& voxels) const noexcept {
+  return origin_m + to_scene * (voxels * lattice->spacing_m());
+}
+
 std::optional<std::size_t> DrawnInside::material_at(const glm::dvec3& at_rest_m) const noexcept {
-  const glm::dvec3 point = glm::round(((at_rest_m - origin_m) * to_scene) / spacing_m);  // v · R is Rᵀ v
-  std::size_t cell = 0;
-  for (std::size_t d = 3; d-- > 0;) {
+  if (lattice == nullptr) return {};
+  const glm::dvec3 point = glm::round(to_voxels(at_rest_m));
+  std::array<int, 3> cell{};
+  for (std::size_t d = 0; d < 3; ++d) {
     const double at = point[static_cast<glm::length_t>(d)];
-    if (!(at >= 0.0) || !(at < dims[d])) return {};
-    cell = cell * static_cast<std::size_t>(dims[d]) + static_cast<std::size_t>(at);
+    if (!(at >= 0.0) || !(at < lattice->grid().dims[d])) return {};
+    cell[d] = static_cast<int>(at);
   }
-  if (cell >= of_voxel.size() || of_voxel[cell] == 0) return {};
-  return of_voxel[cell] - std::size_t{1};
+  const voxel::VoxelId v = lattice->at(cell[0], cell[1], cell[2]);
+  if (!lattice->filled(v)) return {};
+  return of_label[lattice->label(v)];
 }
 
 DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::string& title) {
@@ -157,7 +169,8 @@ DrawnScene drawn_scene(const Scene& scene, const BuiltScene& built, const std::s
     const SoftBody& body = world.soft[o];
     drawn.objects.push_back({body.name, true, body.drawn});
     DrawnObject& object = drawn.objects.back();
-    add_materials(object, scene.soft[o], body, built.state->soft[o]->lattice());
+    add_materials(object, scene.soft[o], body, built.state->soft[o]->shared_lattice());
+    object.scan = scan_of(scene.soft[o]);
     for (glm::dvec3& v : object.surface.vertices) v = body.to_scene(v);
   }
   return drawn;

@@ -6,13 +6,14 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <span>
 
 namespace hybrid {
 namespace {
 
-// Vertices within the patch follow the tick's points near them, weighted by the inverse square of their
+// Points within the patch follow the tick's points near them, weighted by the inverse square of their
 // distance.
-void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std::vector<glm::vec3>& moved) {
+void lay_patch(std::span<const glm::dvec3> at_rest_m, const SoftPatch& patch, std::vector<glm::vec3>& moved) {
   glm::vec3 low = patch.at_rest_m.front(), high = low;
   for (const glm::vec3& at : patch.at_rest_m) {
     low = glm::min(low, at);
@@ -24,7 +25,7 @@ void lay_patch(const polygon::TriangleMesh& surface, const SoftPatch& patch, std
                       std::sqrt(static_cast<float>(std::max<std::size_t>(patch.at_rest_m.size(), 1)));
   const float reach = 1.5F * apart;
   for (std::size_t v = 0; v < moved.size(); ++v) {
-    const glm::vec3 at(surface.vertices[v]);
+    const glm::vec3 at(at_rest_m[v]);
     if (glm::any(glm::lessThan(at, low - reach)) || glm::any(glm::greaterThan(at, high + reach))) continue;
     glm::vec3 sum(0.0F);
     float weights = 0.0F;
@@ -76,22 +77,37 @@ glm::vec3 SoftDent::at(const glm::dvec3& at_rest_m) const noexcept {
   return glm::vec3(0.0F);
 }
 
-void merge_live_surface(const DrawnScene& scene, const Snapshot& snapshot, const MovedSurfaces& surfaces,
-                        Snapshot& shown) {
+void merge_live_surface(const DrawnScene& scene, const Snapshot& snapshot, const RelaxedTissue& relaxed,
+                        const AskedPoints* asked, Snapshot& shown) {
   shown = snapshot;
-  for (std::size_t o = 0; o < std::min(shown.dents.size(), shown.soft_moved_m.size()); ++o) {
-    const SoftDent& dent = shown.dents[o];
-    if (!dent.used) continue;
+  const auto lay_dent = [](const SoftDent& dent, std::span<const glm::dvec3> at_rest_m,
+                           std::vector<glm::vec3>& moved) {
+    moved.assign(at_rest_m.size(), glm::vec3(0.0F));
+    if (dent.count == 0) return;
+    for (std::size_t v = 0; v < at_rest_m.size(); ++v) moved[v] = dent.at(at_rest_m[v]);
+  };
+  const auto has = [](const MovedSurfaces& moved, std::size_t o, std::size_t points) {
+    return o < moved.size() && points > 0 && moved[o].size() == points;
+  };
+  const bool answered_in_tick = asked != nullptr && shown.asked.number == asked->number;
+  if (!answered_in_tick) shown.asked.moved_m.clear();
+  shown.asked.number = asked != nullptr ? asked->number : 0;
+  shown.asked.moved_m.resize(scene.objects.size());
+  for (std::size_t o = 0; o < std::min(shown.soft_moved_m.size(), scene.objects.size()); ++o) {
+    const bool dented = o < shown.dents.size() && shown.dents[o].used;
     const auto& at_rest = scene.objects[o].surface.vertices;
-    shown.soft_moved_m[o].assign(at_rest.size(), glm::vec3(0.0F));
-    if (dent.count == 0) continue;
-    for (std::size_t v = 0; v < at_rest.size(); ++v) shown.soft_moved_m[o][v] = dent.at(at_rest[v]);
-  }
-  for (std::size_t o = 0; o < std::min(surfaces.size(), shown.soft_moved_m.size()); ++o) {
-    if (surfaces[o].empty()) continue;
-    shown.soft_moved_m[o] = surfaces[o];
-    if (o < shown.patches.size() && !shown.patches[o].at_rest_m.empty())
-      lay_patch(scene.objects[o].surface, shown.patches[o], shown.soft_moved_m[o]);
+    if (dented) lay_dent(shown.dents[o], at_rest, shown.soft_moved_m[o]);
+    if (has(relaxed.surfaces, o, at_rest.size())) {
+      shown.soft_moved_m[o] = relaxed.surfaces[o];
+      if (o < shown.patches.size() && !shown.patches[o].at_rest_m.empty())
+        lay_patch(at_rest, shown.patches[o], shown.soft_moved_m[o]);
+    }
+    if (asked == nullptr || o >= asked->at_rest_m.size()) continue;
+    const std::vector<glm::dvec3>& points = asked->at_rest_m[o];
+    if (dented) lay_dent(shown.dents[o], points, shown.asked.moved_m[o]);
+    // All of one state, although it may be some ticks old: strain is made of differences.
+    if (relaxed.asked.number == asked->number && has(relaxed.asked.moved_m, o, points.size()))
+      shown.asked.moved_m[o] = relaxed.asked.moved_m[o];
   }
 }
 

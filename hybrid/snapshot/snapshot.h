@@ -6,9 +6,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,18 +19,33 @@
 #include "hybrid/world/object_feel.h"
 #include "polygon/mesh/mesh.h"
 
+namespace voxel {
+class Lattice;
+}
+
 namespace hybrid {
 
-// The materials within a soft object, voxel by voxel.
+// The voxels of a soft object, at rest.
 struct DrawnInside {
-  std::array<int, 3> dims{};                 // voxels; all 0: not known
-  glm::dmat3 to_scene{1};                    // rotation from the object's axes to the scene's
-  glm::dvec3 origin_m{0.0}, spacing_m{1.0};  // origin: middle of voxel (0, 0, 0), scene frame
-  std::vector<std::string> materials{};      // those that the surface shows come first
-  std::vector<std::uint8_t> of_voxel{};      // x fastest; 0: empty, else 1 + index in `materials`
+  std::shared_ptr<const voxel::Lattice> lattice{};  // null: a rigid object
+  glm::dmat3 to_scene{1};                           // rotation from the object's axes to the scene's
+  glm::dvec3 origin_m{0.0};                         // middle of voxel (0, 0, 0), scene frame
+  std::vector<std::string> materials{};             // those that the surface shows come first
+  std::array<std::uint8_t, 256> of_label{};         // [label] index in `materials`
 
+  // Point at rest (scene frame) in the object's axes, in voxels; and back.
+  [[nodiscard]] glm::dvec3 to_voxels(const glm::dvec3& at_rest_m) const noexcept;
+  [[nodiscard]] glm::dvec3 from_voxels(const glm::dvec3& voxels) const noexcept;
   // Index of the material at a point at rest (scene frame); empty: outside.
   [[nodiscard]] std::optional<std::size_t> material_at(const glm::dvec3& at_rest_m) const noexcept;
+};
+
+// The file with the grey values that a soft object was made from.
+struct DrawnScan {
+  std::filesystem::path file;
+  std::optional<double> unit_m{};  // length unit of its numbers; empty: as the file says
+  glm::dmat3 to_scene{1};          // from the file's frame
+  glm::dvec3 origin_m{0.0};
 };
 
 struct DrawnObject {
@@ -42,7 +59,13 @@ struct DrawnObject {
   // vertex the index of the material beneath it. Otherwise both are empty.
   std::vector<std::string> materials{};
   std::vector<std::uint8_t> vertex_material{};
-  DrawnInside inside{};  // only for a soft object whose surface hides a material
+  DrawnInside inside{};
+  std::optional<DrawnScan> scan{};
+
+  // Does the surface hide a material?
+  [[nodiscard]] bool hides_material() const {
+    return inside.materials.size() > (materials.empty() ? 1 : materials.size());
+  }
 };
 
 struct DrawnScene {
@@ -98,6 +121,22 @@ struct SoftDent {
 // [object][vertex of its surface] displacement (scene frame, meters); empty for a rigid object.
 using MovedSurfaces = std::vector<std::vector<glm::vec3>>;
 
+// Rest points of soft objects whose displacements a view asks for, besides those of the surfaces.
+struct AskedPoints {
+  std::uint64_t number = 0;                        // sets with equal numbers have equal points
+  std::vector<std::vector<glm::dvec3>> at_rest_m;  // [object] (scene frame); empty: none
+};
+// Their displacements (scene frame, m). An object without an answer is empty.
+struct AnsweredPoints {
+  std::uint64_t number = 0;
+  MovedSurfaces moved_m{};
+};
+// Tissue as the relaxation thread knows it.
+struct RelaxedTissue {
+  MovedSurfaces surfaces;
+  AnsweredPoints asked;
+};
+
 // The force of two objects of DrawnScene::objects on one another, or of a soft object's anchors on it.
 struct PairPress {
   static constexpr std::uint32_t kAnchors = 0xFFFFFFFFU;
@@ -119,6 +158,7 @@ struct Snapshot {
   std::vector<SoftDent> dents{};
   // [object], or empty: displacements within the touched soft objects, for a cut.
   std::vector<SoftDent> inside{};
+  AnsweredPoints asked{};
   std::vector<RigidPlace> rigid_place;  // [object]; if shorter: further objects have not moved
   double tick_us = 0.0;
   std::vector<PairPress> presses{};  // pairs that touch; filled between ticks, if anyone asks for them

@@ -172,8 +172,8 @@ void let_tissue_follow(const World& world, WorldState& state, const glm::dvec3& 
 }
 
 // The last operations on the force, in the order that device/README.md justifies.
-glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& force_N,
-                     const device::DeviceState& input, double dt_s) noexcept {
+void make_safe(const World& world, WorldState& state, const glm::dvec3& force_N,
+               const device::DeviceState& input, double dt_s, TickResult& result) noexcept {
   // limit_force() gets the position in use: an invalid input was replaced by the last valid one.
   const device::DeviceState tool{.position_m = state.device_m, .fault = input.fault};
   const std::uint64_t bad = state.limit.nonfinite;
@@ -181,8 +181,12 @@ glm::dvec3 make_safe(const World& world, WorldState& state, const glm::dvec3& fo
   limits.max_force_N = max_force_N(world, state);
   const glm::dvec3 limited = device::limit_force(limits, state.limit, force_N, tool, dt_s);
   state.nonfinite += state.limit.nonfinite - bad;
-  if (!world.passivity) return limited;
-  return device::keep_passive(*world.passivity, state.passive, limited, state.device_m, dt_s);
+  result.force_N = world.passivity
+                       ? device::keep_passive(*world.passivity, state.passive, limited, state.device_m, dt_s)
+                       : limited;
+  // A force that is not finite has no change by the limits.
+  if (polygon::is_finite(force_N)) result.limits_N = limited - force_N;
+  result.passivity_N = result.force_N - limited;
 }
 
 // The hand feels the coupling, damping and texture alone; the parts and contacts are only recorded.
@@ -193,7 +197,9 @@ void publish_force(const World& world, WorldState& state, const Sweep& sweep,
   result.proxy_m = state.proxy_m;
   result.rigid_N = sweep.force_N + added;
   result.soft_N = coupling - sweep.force_N;
-  result.force_N = make_safe(world, state, coupling + added, input, dt_s);
+  result.friction_N = state.friction_N;
+  result.damping_N = added;
+  make_safe(world, state, coupling + added, input, dt_s, result);
   split_by_object(world, state, result.soft_N);
   for (std::size_t o = 0; o < state.feel.size(); ++o) {
     if (state.feel[o].contact) result.contacts |= 1U << std::min<std::size_t>(o, 31);

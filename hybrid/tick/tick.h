@@ -31,6 +31,11 @@ struct TickResult {
   glm::dvec3 force_N{0.0};  // on the hand, after the limits
   // Parts of the force before the limits: rigid_N + soft_N = K (proxy − device) plus damping and texture.
   glm::dvec3 rigid_N{0.0}, soft_N{0.0};
+  // Within rigid_N: friction with shading; damping with texture.
+  glm::dvec3 friction_N{0.0}, damping_N{0.0};
+  // Changes of the force by the limits, and then by the passivity controller. So force_N = rigid_N + soft_N +
+  // limits_N + passivity_N, up to rounding.
+  glm::dvec3 limits_N{0.0}, passivity_N{0.0};
   // A bit per object, rigid ones first; all objects from the 32nd on share the last bit.
   std::uint32_t contacts = 0;
   std::array<float, kStages> stage_us{};  // CPU time of this thread

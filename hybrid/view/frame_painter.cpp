@@ -24,25 +24,36 @@ void keep_freed_memory() {
 }  // namespace
 
 FramePainter::FramePainter(const DrawnScene& scene, Samples samples, int height)
-    : scene_(scene), renderer_(scene, samples), overlay_(height) {
+    : scene_(scene),
+      tissue_(scene, bounds_of(scene).centre_m),
+      renderer_(scene, samples),
+      overlay_(height),
+      box_(soft_box(scene)) {
   renderer_.set_font(overlay_.font());
   if (samples == Samples::fast && draws_in_software()) keep_freed_memory();
 }
 
 void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options) {
   renderer_.set_view(options.view);
-  renderer_.begin(scene_, snapshot, options.width, options.height);
+  tissue_.set(options.view);
+  tissue_.take(snapshot);
+  renderer_.begin(scene_, snapshot, tissue_, options.width, options.height);
   OverlayContent content;
-  content.layout =
-      frame_layout(options.width, options.height, !options.help.empty(), options.panel != nullptr);
+  content.layout = frame_layout(options.width, options.height, !options.help.empty(),
+                                options.panel != nullptr, !box_.empty);
   content.width = options.width;
   content.height = options.height;
   content.camera = camera;
-  content.displacement_scale_m = renderer_.displacement_scale_m();
+  content.scale = tissue_.scale();
+  content.slices = slice_frames(box_, options.view);
+  content.names_materials =
+      options.view.colour == TissueColour::material || (options.view.sliced() && !options.view.grey);
   content.panel = options.panel;
   content.dark = options.view.dark;
   content.help = options.help;
   content.notice = options.notice;
+  if (const std::string words = tissue_.in_words(); !words.empty())
+    content.notice += (content.notice.empty() ? "" : "\n") + words;
   content.paused = options.paused;
 
   const FrameLayout& layout = content.layout;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
@@ -27,6 +28,11 @@ class FramePainter {
  public:
   FramePainter(const DrawnScene& scene, Samples samples, int height);
 
+  // The points whose displacements the snapshot of a frame with these settings should carry; null: none.
+  [[nodiscard]] const std::shared_ptr<const AskedPoints>& asked(const ViewSettings& view) {
+    tissue_.set(view);
+    return tissue_.asked();
+  }
   // Draws the frame off screen. Call present() or read_rgb() afterwards.
   void paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options);
   // Frees all objects in the context. This painter must not paint any more.
@@ -36,8 +42,10 @@ class FramePainter {
 
  private:
   const DrawnScene& scene_;
+  TissueView tissue_;
   Renderer renderer_;
   Overlay overlay_;
+  SoftBox box_;
 };
 
 }  // namespace hybrid

@@ -12,8 +12,8 @@
 #include <stdexcept>
 
 #include "hybrid/base/whole_file.h"
+#include "hybrid/view/gl/unit_shapes.h"
 #include "hybrid/view/palette.h"
-#include "hybrid/view/unit_shapes.h"
 
 namespace hybrid {
 namespace {
@@ -143,7 +143,7 @@ void add_objects(Json& gltf, GlbBuffer& buffer, const DrawnScene& scene, const S
     const glm::dvec3 middle_m = middle_of(mesh);
     const DrawMesh draw = object.soft ? make_moving_mesh(mesh, middle_m) : make_draw_mesh(mesh, middle_m);
     if (draw.indices.empty()) continue;  // glTF has no empty arrays
-    const std::vector<VertexColour> colours = colours_of_vertices(scene, o);
+    const std::vector<VertexColour> colours = palette::of_vertices(scene, o);
     add_material(gltf, object.name, colours.empty() ? palette::of_object(scene, o) : glm::vec3(1.0F));
     children.push_back(add_glb_object(gltf, buffer, object.name, draw, middle_m, colours));
   }

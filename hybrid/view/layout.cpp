@@ -11,6 +11,7 @@ namespace {
 constexpr float kHeading = 4.4F;
 constexpr float kHelp = 1.9F;     // height of the line of help
 constexpr float kColumn = 25.0F;  // width of the column beside the scene
+constexpr float kKey = 8.5F;      // width of the key of colours beside a panel
 // Least width of the scene; if it would be narrower, there is no column.
 constexpr float kLeastScene = 16.0F;
 constexpr float kColumnShare = 1.0F / 3.0F;  // most width of the column, as a share of the frame's width
@@ -34,15 +35,17 @@ double FrameLayout::aspect() const {
   return static_cast<double>(std::max(scene.width, 1)) / std::max(scene.height, 1);
 }
 
-FrameLayout frame_layout(int width, int height, bool help, bool panel) {
+FrameLayout frame_layout(int width, int height, bool help, bool panel, bool key) {
   const float em = text_height(height);
   const int top = std::min(static_cast<int>(kHeading * em), height / 4);
   const int bottom = help ? std::min(static_cast<int>(kHelp * em), height / 8) : 0;
   int column =
       std::min(static_cast<int>(kColumn * em), static_cast<int>(kColumnShare * static_cast<float>(width)));
   if (static_cast<float>(width - column) < kLeastScene * em) column = 0;
+  const int key_width = panel && key && column > 0 ? static_cast<int>(kKey * em) : 0;
   FrameLayout layout;
-  layout.scene = {0, top, width - column, std::max(height - top - bottom, 1)};
+  layout.scene = {0, top, width - column - key_width, std::max(height - top - bottom, 1)};
+  layout.key = {layout.scene.width, top, key_width, layout.scene.height};
   layout.column = {width - column, top, column, layout.scene.height};
   const int margin = static_cast<int>(0.6F * em);
   const int side =

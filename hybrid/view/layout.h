@@ -6,13 +6,9 @@
 #include <optional>
 
 #include "hybrid/view/camera.h"
+#include "hybrid/view/gl/pixel_rect.h"
 
 namespace hybrid {
-
-// Rectangle of the frame (pixels, y down from the top).
-struct PixelRect {
-  int x = 0, y = 0, width = 0, height = 0;
-};
 
 // Height of body text in a frame of this height (pixels).
 float text_height(int frame_height);
@@ -20,6 +16,7 @@ float text_height(int frame_height);
 struct FrameLayout {
   PixelRect scene;
   PixelRect column;  // on the right; width 0 if the frame is too narrow for a column
+  PixelRect key;     // between scene and panel: what the colours of tissue mean; width 0: none
   // Square; at the lower end of the column, or of the scene if there is a panel; width 0 without a column.
   PixelRect inset;
 
@@ -29,8 +26,8 @@ struct FrameLayout {
 };
 
 // `help`: a line of help is below the scene. `panel`: a window's panel fills the column, and the nearer view
-// is in a corner of the scene.
-FrameLayout frame_layout(int width, int height, bool help, bool panel = false);
+// is in a corner of the scene. `key`: beside a panel there is a key of colours.
+FrameLayout frame_layout(int width, int height, bool help, bool panel = false, bool key = false);
 
 // The nearer view of the contact is drawn only if it is at least this many times nearer.
 inline constexpr double kLeastNearer = 1.5;

@@ -96,7 +96,7 @@ void add_object(std::vector<LegendRow>& rows, const DrawnScene& scene, const Sna
                   .force = feel.contact ? force_text(feel.force_N) : "-",
                   .touched = feel.contact});
   // Materials that the surface hides and a cut shows.
-  if (object < snapshot.inside.size() && snapshot.inside[object].used && material_rows > 0) {
+  if (object < snapshot.inside.size() && snapshot.inside[object].used && drawn.hides_material()) {
     const std::vector<glm::vec3> within = palette::of_inside(scene, object);
     for (std::size_t m = std::max<std::size_t>(drawn.materials.size(), 1); m < within.size(); ++m) {
       if (material_rows == 0) break;

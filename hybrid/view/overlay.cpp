@@ -14,19 +14,6 @@
 
 namespace hybrid {
 
-namespace {
-
-constexpr float kScaleWidth = 12.0F;  // width of the colour scale in a corner of the scene (em)
-
-// Place of the colour scale while a panel fills the column: the scene's upper right corner.
-PixelRect colour_scale_beside_panel(const Pen& pen, const PixelRect& scene) {
-  const int margin = static_cast<int>(0.6F * pen.em), width = static_cast<int>(kScaleWidth * pen.em);
-  return {scene.x + scene.width - width - margin, scene.y, width,
-          static_cast<int>(kColourScaleHeight * pen.em)};
-}
-
-}  // namespace
-
 struct Overlay::State {
   ImGuiContext* context = nullptr;
   Pen pen;
@@ -43,7 +30,7 @@ struct Overlay::State {
       std::error_code ignored;
       if (!std::filesystem::is_regular_file(file, ignored)) continue;
       static constexpr std::array<ImWchar, 9> ranges{0x0020, 0x024F, 0x0370, 0x03FF, 0x0400,
-                                                     0x04FF, 0x2010, 0x2264, 0};
+                                                     0x04FF, 0x2010, 0x2265, 0};
       pen.em = text_height(height);
       pen.body = fonts.AddFontFromFileTTF(file, pen.em, &config, ranges.data());
       pen.head = fonts.AddFontFromFileTTF(file, std::round(1.6F * pen.em), &config, ranges.data());
@@ -103,12 +90,12 @@ OverlayMesh Overlay::build(const DrawnScene& scene, const Snapshot& snapshot, co
     draw_force_label(pen, scene, snapshot, content.inset->camera, content.layout.inset);
     draw_scale_bar(pen, content.inset->camera, content.layout.inset);
   }
+  draw_slice_frames(pen, content);
   draw_heading(pen, scene, snapshot, content);
   draw_scale_bar(pen, content.camera, view);
   if (content.panel != nullptr) {
     content.panel->draw(pen, scene, snapshot, content.layout.column);
-    if (content.displacement_scale_m > 0.0)
-      draw_colour_scale(pen, colour_scale_beside_panel(pen, view), content.displacement_scale_m);
+    draw_colour_key(pen, scene, content);
   } else {
     draw_column(pen, scene, snapshot, content);
   }

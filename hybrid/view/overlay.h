@@ -13,9 +13,11 @@
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
-#include "hybrid/view/gl_objects.h"
+#include "hybrid/view/gl/gl_objects.h"
 #include "hybrid/view/layout.h"
 #include "hybrid/view/overlay_panel.h"
+#include "hybrid/view/slice_frames.h"
+#include "hybrid/view/tissue_view.h"
 
 namespace hybrid {
 
@@ -28,8 +30,9 @@ struct OverlayContent {
     double nearer = 1.0;  // times_nearer()
   };
   std::optional<Inset> inset;
-  // End of the colour scale; 0: nothing soft has moved, and there is no scale.
-  double displacement_scale_m = 0.0;
+  ColourScale scale;             // of tissue
+  bool names_materials = false;  // beside a panel: the key names materials
+  std::vector<SliceFrame> slices;
   // Only in a window:
   OverlayPanel* panel = nullptr;  // in place of the legend; null: the legend
   std::string help;               // one line; empty: none

@@ -73,7 +73,7 @@ void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapsh
                      static_cast<int>(height_em * em)};
   };
   const float end = static_cast<float>(content.inset ? content.layout.inset.y : column.y + column.height);
-  const bool scale = content.displacement_scale_m > 0.0;
+  const bool scale = content.scale.end > 0.0;
   const float charts = scale ? kColourScaleHeight + kMargin : 0.0F;
   const float room = (end - static_cast<float>(column.y)) / em - charts - kMargin;
   const float rows_fit = (room - 1.0F) / kLine;
@@ -86,8 +86,7 @@ void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapsh
   const float y =
       static_cast<float>(column.y) + em * (kLine * static_cast<float>(rows.size()) + 1.0F + kMargin);
   if (scale) {
-    if (y + kColourScaleHeight * em < end)
-      draw_colour_scale(pen, part(y, kColourScaleHeight), content.displacement_scale_m);
+    if (y + kColourScaleHeight * em < end) draw_colour_scale(pen, part(y, kColourScaleHeight), content.scale);
   }
 }
 

@@ -6,7 +6,6 @@
 #include <glm/geometric.hpp>
 
 #include "hybrid/base/number_text.h"
-#include "hybrid/view/palette.h"
 #include "hybrid/view/tool_and_arrow.h"
 #include "polygon/mesh/is_finite.h"
 
@@ -30,33 +29,6 @@ void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   pen.text(x, y, pen.inks.text,
            "time " + with_decimals(snapshot.t_s, 3) + " s    force on the hand " +
                force_text(glm::length(snapshot.force_N)) + (content.paused ? "    PAUSED" : ""));
-}
-
-void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m) {
-  constexpr int steps = 160;
-  const float em = pen.em;
-  const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
-  const auto w = static_cast<float>(where.width);
-  pen.plate(x0, y0, w, static_cast<float>(where.height));
-  pen.text(x0 + 0.8F * em, y0 + 0.5F * em, pen.inks.text, "tissue moved by");
-  const float left = x0 + 0.8F * em, right = x0 + w - 0.8F * em;
-  const float top = y0 + 2.0F * em, bottom = top + 0.9F * em;
-  // Tissue that hardly moved keeps its own colour. The scale shows white in its place.
-  const glm::vec3 paper(1.0F);
-  for (int s = 0; s < steps; ++s) {
-    const float a = static_cast<float>(s) / steps, b = static_cast<float>(s + 1) / steps;
-    pen.fill({left + a * (right - left), top}, {left + b * (right - left), bottom},
-             ink_of(palette::of_displacement(paper, 0.5F * (a + b))));
-  }
-  pen.frame({left, top}, {right, bottom}, pen.inks.edge);
-  for (int tick = 0; tick <= 4; ++tick) {
-    const float x = left + (right - left) * static_cast<float>(tick) / 4.0F;
-    pen.line({x, bottom}, {x, bottom + 0.25F * em}, pen.inks.text);
-    if (tick % 2 != 0) continue;
-    const std::string words = tick == 0 ? "0" : length_text(scale_m * tick / 4.0);
-    const float wide = pen.width(words);
-    pen.text(std::clamp(x - 0.5F * wide, left, right - wide), bottom + 0.4F * em, pen.inks.text, words);
-  }
 }
 
 void draw_scale_bar(const Pen& pen, const Camera& camera, const PixelRect& where) {

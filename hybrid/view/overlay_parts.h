@@ -21,11 +21,15 @@ void draw_force_label(const Pen& pen, const DrawnScene& scene, const Snapshot& s
 // Draws a message at the top of the scene, in as many lines as it needs.
 void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where);
 
-// Draws the column beside the scene: the legend, and below it the colour scale of displacement. Both are
+// Draws the column beside the scene: the legend, and below it the colour scale of tissue. Both are
 // above the inset. Parts without room are left out. Legend rows without room are counted in a last row.
 void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                  const OverlayContent& content);
-void draw_colour_scale(const Pen& pen, const PixelRect& where, double scale_m);
+void draw_colour_scale(const Pen& pen, const PixelRect& where, const ColourScale& scale);
+// Draws the key between scene and panel: the colour scale upright, and names of materials.
+void draw_colour_key(const Pen& pen, const DrawnScene& scene, const OverlayContent& content);
+// Draws the outlines of slices and their handles, but not over the inset.
+void draw_slice_frames(const Pen& pen, const OverlayContent& content);
 inline constexpr float kColourScaleHeight = 5.0F;  // (em)
 
 }  // namespace hybrid

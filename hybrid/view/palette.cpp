@@ -97,6 +97,17 @@ std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index) {
   return colours;
 }
 
+std::vector<VertexColour> of_vertices(const DrawnScene& scene, std::size_t index) {
+  const DrawnObject& object = scene.objects[index];
+  if (object.materials.empty()) return {};
+  std::vector<VertexColour> of_material, of_vertex;
+  for (const glm::vec3& c : of_materials(scene, index)) of_material.push_back(bytes_of(c));
+  of_vertex.reserve(object.vertex_material.size());
+  for (const std::uint8_t m : object.vertex_material)
+    of_vertex.push_back(of_material[std::min<std::size_t>(m, of_material.size() - 1)]);
+  return of_vertex;
+}
+
 double scale_end(double moved_m) {
   const double power = std::pow(10.0, std::floor(std::log10(moved_m)));
   for (const double step : {1.0, 2.0, 5.0}) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
+#include "hybrid/view/gl/unit_shapes.h"
 
 namespace hybrid::palette {
 
@@ -20,10 +21,14 @@ inline constexpr glm::vec3 dark_tool{0.66F, 0.71F, 0.79F};  // on the dark backg
 inline constexpr glm::vec3 device{0.10F, 0.45F, 0.85F};
 inline constexpr glm::vec3 force{0.03F, 0.38F, 0.93F};
 
-// The scale of displacement, from 0 to its end: viridis (Smith & van der Walt 2015). Equal steps of viridis
-// look equal, to colour-blind readers too, and its lightness rises from end to end. Tissue that hardly moved
-// keeps its own colour: up to the share kOwnUntil of the scale only the own colour is drawn, and from
-// kRampFrom on only viridis.
+// Axes of the scene, x first (Okabe & Ito 2008).
+inline constexpr std::array<glm::vec3, 3> axes{
+    {{0.835F, 0.369F, 0.0F}, {0.0F, 0.55F, 0.40F}, {0.0F, 0.447F, 0.698F}}};
+
+// The scale of a quantity of tissue, from 0 to its end: viridis (Smith & van der Walt 2015). Equal steps of
+// viridis look equal, to colour-blind readers too, and its lightness rises from end to end. Tissue that
+// hardly moved keeps its own colour: up to the share kOwnUntil of the scale only the own colour is drawn, and
+// from kRampFrom on only viridis.
 inline constexpr std::array<glm::vec3, 9> moved{{{0.267F, 0.005F, 0.329F},
                                                  {0.283F, 0.141F, 0.458F},
                                                  {0.229F, 0.322F, 0.546F},
@@ -76,6 +81,9 @@ std::vector<glm::vec3> of_materials(const DrawnScene& scene, std::size_t index);
 
 // Colours of all materials within an object (DrawnInside::materials), including those that the surface hides.
 std::vector<glm::vec3> of_inside(const DrawnScene& scene, std::size_t index);
+
+// Colours of the materials at an object's vertices, in the mesh's order; empty if the object has one colour.
+std::vector<VertexColour> of_vertices(const DrawnScene& scene, std::size_t index);
 
 // End of the scale for a largest displacement: the next 1, 2 or 5 · 10^n at or above it (m).
 double scale_end(double moved_m);

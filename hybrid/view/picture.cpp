@@ -126,16 +126,21 @@ PictureMaker::PictureMaker(const DrawnScene& scene, int height)
 
 PictureMaker::~PictureMaker() = default;
 
-void PictureMaker::save(const std::filesystem::path& png, const Snapshot& snapshot,
-                        const PictureOptions& options) {
+std::vector<std::uint8_t> PictureMaker::draw(const Snapshot& snapshot, const PictureOptions& options) {
   const double aspect = frame_layout(options.width, options.height, false).aspect();
   FrameOptions frame;
   frame.width = options.width;
   frame.height = options.height;
   frame.inset = options.inset;
+  frame.view = options.view;
   state_->painter.paint(
       snapshot, options.camera ? *options.camera : frame_scene(state_->scene, snapshot, aspect), frame);
-  save_png(png, options.width, options.height, state_->painter.read_rgb());
+  return state_->painter.read_rgb();
+}
+
+void PictureMaker::save(const std::filesystem::path& png, const Snapshot& snapshot,
+                        const PictureOptions& options) {
+  save_png(png, options.width, options.height, draw(snapshot, options));
 }
 
 void save_picture(const std::filesystem::path& png, const DrawnScene& scene, const Snapshot& snapshot,

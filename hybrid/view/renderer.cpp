@@ -6,44 +6,27 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <glm/geometric.hpp>
-#include <limits>
-#include <span>
-#include <stdexcept>
+#include <optional>
 
-#include "hybrid/view/gl_objects.h"
+#include "hybrid/view/gl/gl_objects.h"
+#include "hybrid/view/gl/shading.h"
+#include "hybrid/view/gl/unit_shapes.h"
 #include "hybrid/view/palette.h"
-#include "hybrid/view/section.h"
-#include "hybrid/view/shading.h"
+#include "hybrid/view/rigid_layer.h"
+#include "hybrid/view/scene_meshes.h"
 #include "hybrid/view/tool_and_arrow.h"
-#include "hybrid/view/unit_shapes.h"
 #include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 namespace {
 
-constexpr glm::vec4 kKeepAll{0.0F, 0.0F, 0.0F, 1.0F};  // a plane that clips nothing
-
-struct Object {
-  GlMesh mesh;
-  DrawMesh moving;                 // used by soft objects only
-  std::vector<glm::vec3> moved_m;  // displacements that are uploaded; of soft objects only
-  float most_moved_m = 0.0F;
-  bool soft = false;
-  bool lit_by_vertex = false;
-  bool closed = false;  // as is_closed_outwards() says
-  glm::vec3 colour{1.0F};
-  SceneBounds bounds;        // at rest
-  glm::mat4 placed{1.0F};    // from the uploaded pose to the present one
-  GlMesh face;               // face of a cut in the present view; empty: no cut
-  glm::vec4 kept{kKeepAll};  // plane of the cut: the part on its positive side is drawn
-};
-
-// Without a graphics card, meshes of more triangles are lit at their vertices. In a window such triangles are
-// a few pixels large.
-constexpr std::size_t kLitByVertex = 10'000;
 constexpr double kDepthApart = 5e-4;  // share of the view's height: about half a pixel
+
+constexpr float kRampOverGrey = 0.6F;    // share of the ramp where it lies over grey values
+constexpr float kSlicedOpacity = 0.22F;  // of the surface around slices
+
+constexpr std::size_t kViews = 2;  // views in a frame: the scene, and the inset
 
 }  // namespace
 
@@ -51,19 +34,23 @@ struct Renderer::State {
   ShadingPrograms programs;
   GLuint program = 0;               // the program in use
   glm::mat4 clip{1.0F};             // clip_from_scene of the program in use
+  glm::mat4 seen{1.0F};             // as `clip`, of the part of the view that is drawn
   glm::vec3 eye{0.0F};              // relative to origin_m
   glm::vec3 right{0.0F}, up{0.0F};  // axes of the camera
   float nearer = 0.0F;              // as in the shader
   float apart = 0.0F;               // kDepthApart in the present view (m)
-  std::vector<Object> objects;
+  std::optional<SceneMeshes> meshes;
   GlMesh ball, cylinder, cone, disc;
+  GlCover cover;
+  std::array<RigidLayer, kViews> layers;
+  std::size_t view_number = 0;  // of the next view in this frame
   GlOverlay overlay;
   ViewSettings view;
   RenderTargets targets;
-  int width = 0, height = 0, factor = 1, wanted_factor = 1;
+  int width = 0, height = 0, wanted_samples = 1;
   SceneBounds bounds;        // at rest
   glm::dvec3 origin_m{0.0};  // uploaded positions are floats relative to this point
-  double most_moved_m = 0.0;
+  ColourScale scale;
 
   // Uses a program, in the present view. Uniforms that a program does not have are ignored.
   void use(Shading shading, bool by_vertex = false) {
@@ -76,11 +63,13 @@ struct Renderer::State {
     uniform("apart", apart);
     uniform("nearer", nearer);
     uniform("shown_depth", 0);
+    uniform("slice_image", 0);
     uniform("coloured_vertices", 0);
     uniform("clip_plane", kKeepAll);
     uniform("kept", kKeepAll);
-    if (shading != Shading::tissue) return;
+    if (shading != Shading::tissue && shading != Shading::slice) return;
     uniform("moved_ramp", palette::moved);
+    uniform("ramp_share", 1.0F);
     uniform("own_until", palette::kOwnUntil);
     uniform("ramp_from", palette::kRampFrom);
   }
@@ -94,16 +83,30 @@ struct Renderer::State {
     uniform("scene_from_mesh", scene_from_mesh);
     uniform("normal_from_mesh", normal);
   }
-  void cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera);
   // The rectangle in samples of the scene's textures, y up from the bottom.
   [[nodiscard]] PixelRect samples_of(const PixelRect& where) const {
-    return {where.x * factor, (height - where.y - where.height) * factor, where.width * factor,
-            where.height * factor};
+    const int n = targets.samples;
+    return {where.x * n, (height - where.y - where.height) * n, where.width * n, where.height * n};
+  }
+  [[nodiscard]] ObjectLook look_of(std::size_t object) const {
+    ObjectLook look = view.look_of(object);
+    if (meshes->all()[object].soft && view.sliced() && look.opacity >= 1.0F) look.opacity = kSlicedOpacity;
+    return look;
+  }
+  [[nodiscard]] bool is_opaque(std::size_t object, bool soft) const {
+    const ObjectLook look = look_of(object);
+    return meshes->all()[object].soft == soft && look.visible && look.opacity >= 1.0F;
   }
   void copy_depth(const PixelRect& where) const;
-  void draw_objects(bool soft, Shading shading);
-  void draw_object(const Object& object, float alpha) const;
-  [[nodiscard]] bool is_outside(const Object& object, float margin) const;  // is the eye?
+  void draw_rigid(Shading shading);
+  void draw_soft();
+  void draw_object(const SceneMesh& object, float alpha, const ValueRange& values = {}) const;
+  void draw_tissue(const SceneMesh& object, float alpha);
+  void draw_section(const GlSection& section);
+  [[nodiscard]] bool is_outside(const SceneMesh& object, float margin) const;  // is the eye?
+  void draw_rigid_layer(RigidLayer& rigid, const PixelRect& pixels);
+  void copy_rigid_layer(const RigidLayer& rigid, const PixelRect& pixels, const glm::dmat4& clip_from_scene);
+  void draw_behind_disc(const glm::mat4& disc, const PixelRect& pixels);
   void draw_translucent();
   void draw_tool(const DrawnScene& scene, const glm::dvec3& at) const;
   void draw_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) const;
@@ -118,65 +121,144 @@ void Renderer::State::copy_depth(const PixelRect& where) const {
                     GL_DEPTH_BUFFER_BIT, GL_NEAREST);
 }
 
-// Draws the opaque objects that are soft, or those that are rigid.
-void Renderer::State::draw_objects(bool soft, Shading shading) {
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    const ObjectLook look = view.look_of(i);
-    if (objects[i].soft != soft || !look.visible || look.opacity < 1.0F) continue;
-    use(shading, objects[i].lit_by_vertex);
-    draw_object(objects[i], 1.0F);
+// Draws the opaque rigid objects.
+void Renderer::State::draw_rigid(Shading shading) {
+  nearer = apart;
+  for (std::size_t i = 0; i < meshes->all().size(); ++i) {
+    if (!is_opaque(i, false)) continue;
+    use(shading, meshes->all()[i].lit_by_vertex);
+    draw_object(meshes->all()[i], 1.0F);
+  }
+  nearer = 0.0F;
+}
+
+// Draws the opaque soft objects, and all slices.
+void Renderer::State::draw_soft() {
+  for (std::size_t i = 0; i < meshes->all().size(); ++i) {
+    if (is_opaque(i, true)) draw_tissue(meshes->all()[i], 1.0F);
+    if (!view.look_of(i).visible) continue;
+    for (const GlSection& slice : meshes->all()[i].slices) draw_section(slice);
   }
 }
 
-bool Renderer::State::is_outside(const Object& object, float margin) const {
+// Most tissue has its own colour, for which a cheaper program is enough.
+void Renderer::State::draw_tissue(const SceneMesh& object, float alpha) {
+  const float most_own = palette::kOwnUntil * static_cast<float>(scale.end);
+  use(Shading::plain, object.lit_by_vertex);
+  draw_object(object, alpha, scale.end > 0.0 ? ValueRange{.up_to = most_own} : ValueRange{});
+  if (scale.end > 0.0) {
+    use(Shading::tissue, object.lit_by_vertex);
+    draw_object(object, alpha, {.above = most_own});
+  }
+  if (object.face.mesh.count > 0) draw_section(object.face);
+}
+
+bool Renderer::State::is_outside(const SceneMesh& object, float margin) const {
   const glm::vec3 centre(object.placed * glm::vec4(glm::vec3(object.bounds.centre_m - origin_m), 1.0F));
   return glm::distance(eye, centre) > static_cast<float>(object.bounds.radius_m) + margin;
 }
 
-void Renderer::State::draw_object(const Object& object, float alpha) const {
+void Renderer::State::draw_object(const SceneMesh& object, float alpha, const ValueRange& values) const {
   if (object.mesh.count == 0) return;
   uniform("alpha", alpha);
   uniform("shine", object.soft ? 0.10F : 0.05F);
   place(object.placed);
   uniform("own_colour", object.colour);
   uniform("coloured_vertices", object.mesh.colours != 0 ? 1 : 0);
-  uniform("moved_scale", object.soft ? static_cast<float>(most_moved_m) : 0.0F);
-  uniform("kept", object.kept);
+  uniform("moved_scale", object.soft ? static_cast<float>(scale.end) : 0.0F);
+  const bool cut = object.face.mesh.count > 0;
+  uniform("kept", cut ? object.kept : kKeepAll);
   const auto clip_plane = clip_equation(view.clip, bounds, origin_m);
   uniform("clip_plane", clip_plane.value_or(kKeepAll));
   if (clip_plane) glEnable(GL_CLIP_DISTANCE1);
-  if (object.face.count > 0) glEnable(GL_CLIP_DISTANCE0);
+  if (cut) glEnable(GL_CLIP_DISTANCE0);
   // A closed object that is whole shows no back of a triangle to an eye outside it.
-  const float margin = object.most_moved_m + apart;
   const bool backs_hidden =
-      object.closed && !clip_plane && object.face.count == 0 && is_outside(object, margin);
+      object.closed && !clip_plane && !cut && is_outside(object, object.most_moved_m + apart);
   if (backs_hidden) glEnable(GL_CULL_FACE);
-  object.mesh.draw_seen(clip * object.placed, margin);
+  object.mesh.draw_seen(seen * object.placed, apart, values);
   if (backs_hidden) glDisable(GL_CULL_FACE);
   glDisable(GL_CLIP_DISTANCE0);
-  if (object.face.count > 0) {
-    // The face lies in the cut's plane, so rounding could clip it. Use a plane that keeps all.
-    uniform("kept", kKeepAll);
-    uniform("coloured_vertices", 1);
-    uniform("moved_scale", 0.0F);
-    object.face.draw();
-  }
   glDisable(GL_CLIP_DISTANCE1);
   // Some drivers clip even when clipping is switched off. This plane keeps tool and arrow whole.
   uniform("clip_plane", kKeepAll);
 }
 
+// The face of a cut lies in the cut's plane, so rounding could clip it: it keeps all. Slices obey the view's
+// clip plane.
+void Renderer::State::draw_section(const GlSection& section) {
+  use(Shading::slice);
+  uniform("ramp_share", view.grey ? kRampOverGrey : 1.0F);
+  bind_image(section.image);
+  place(glm::mat4(1.0F));
+  uniform("moved_scale", static_cast<float>(scale.end));
+  const auto clip_plane = clip_equation(view.clip, bounds, origin_m);
+  uniform("clip_plane", clip_plane.value_or(kKeepAll));
+  if (clip_plane) glEnable(GL_CLIP_DISTANCE1);
+  section.mesh.draw();
+  glDisable(GL_CLIP_DISTANCE1);
+}
+
+void Renderer::State::draw_rigid_layer(RigidLayer& rigid, const PixelRect& pixels) {
+  LayerKey key{.clip = clip, .clip_plane = clip_equation(view.clip, bounds, origin_m).value_or(kKeepAll)};
+  for (std::size_t i = 0; i < meshes->all().size(); ++i) {
+    if (is_opaque(i, false)) key.drawn.emplace_back(i, meshes->all()[i].placed);
+  }
+  const bool fresh = rigid.layer.set_size(pixels.width, pixels.height);
+  if (!fresh && key == rigid.key) return;
+  rigid.key = std::move(key);
+  glBindFramebuffer(GL_FRAMEBUFFER, rigid.layer.frame);
+  glViewport(0, 0, pixels.width, pixels.height);
+  glDisable(GL_SCISSOR_TEST);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  draw_rigid(Shading::layer);
+  glEnable(GL_SCISSOR_TEST);
+  glViewport(pixels.x, pixels.y, pixels.width, pixels.height);
+}
+
+void Renderer::State::copy_rigid_layer(const RigidLayer& rigid, const PixelRect& pixels,
+                                       const glm::dmat4& clip_from_scene) {
+  if (rigid.key.drawn.empty()) return;
+  use(Shading::cover);
+  // The layer was drawn nearer to the eye by `apart`.
+  uniform("further", depth_further(clip_from_scene, 2.0 * static_cast<double>(apart)));
+  uniform("corner", glm::ivec2(pixels.x, pixels.y));
+  uniform("layer_colour", 1);
+  uniform("layer_depth", 2);
+  glActiveTexture(GL_TEXTURE1);
+  glBindTexture(GL_TEXTURE_2D, rigid.layer.colour);
+  glActiveTexture(GL_TEXTURE2);
+  glBindTexture(GL_TEXTURE_2D, rigid.layer.depth);
+  bind_image(targets.shown_depth);
+  cover.draw();
+}
+
+// The layer has only the nearest rigid surface. Beside the tool, where that surface is drawn thin, nothing
+// soft need lie behind it, but other rigid surfaces may: within the disc they are drawn one by one.
+void Renderer::State::draw_behind_disc(const glm::mat4& placed_disc, const PixelRect& pixels) {
+  const auto part = part_with_disc(clip, placed_disc, pixels);
+  if (!part) return;
+  glScissor(part->pixels.x, part->pixels.y, part->pixels.width, part->pixels.height);
+  seen = part->whole_from_clip * clip;  // parts of meshes beside the rectangle are left out
+  bind_image(targets.shown_depth);
+  draw_rigid(Shading::unhiding);
+  seen = clip;
+  glScissor(pixels.x, pixels.y, pixels.width, pixels.height);
+}
+
 // Of translucent objects only the nearest surface is blended, which a depth-only pass finds first.
 void Renderer::State::draw_translucent() {
   const auto draw_all = [this](bool depth_only) {
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-      const ObjectLook look = view.look_of(i);
+    for (std::size_t i = 0; i < meshes->all().size(); ++i) {
+      const SceneMesh& object = meshes->all()[i];
+      const ObjectLook look = look_of(i);
       if (!look.visible || look.opacity >= 1.0F || look.opacity <= 0.0F) continue;
-      use(depth_only        ? Shading::depth
-          : objects[i].soft ? Shading::tissue
-                            : Shading::plain,
-          objects[i].lit_by_vertex);
-      draw_object(objects[i], look.opacity);
+      if (object.soft && !depth_only) {
+        draw_tissue(object, look.opacity);
+        continue;
+      }
+      use(depth_only ? Shading::depth : Shading::plain, object.lit_by_vertex);
+      draw_object(object, look.opacity);
     }
   };
   glDepthMask(GL_TRUE);
@@ -184,22 +266,6 @@ void Renderer::State::draw_translucent() {
   draw_all(true);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   draw_all(false);
-}
-
-void Renderer::State::cut_objects(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera) {
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    Object& object = objects[i];
-    if (object.face.count > 0) object.face.release();
-    const auto cut =
-        object.soft && view.look_of(i).visible ? choose_cut(scene, snapshot, camera, i) : std::nullopt;
-    if (!cut) continue;
-    const SectionMesh section = make_section(scene, snapshot, i, *cut, origin_m);
-    if (section.mesh.indices.empty()) continue;
-    object.face.upload(section.mesh, GL_STATIC_DRAW);
-    object.face.upload_colours(section.colours);
-    const glm::dvec3 away = -cut->toward_eye;
-    object.kept = glm::vec4(glm::dvec4(away, -glm::dot(away, cut->point_m - origin_m)));
-  }
 }
 
 void Renderer::State::draw_tool(const DrawnScene& scene, const glm::dvec3& at) const {
@@ -220,33 +286,16 @@ void Renderer::State::draw_arrow(const DrawnScene& scene, const Snapshot& snapsh
 Renderer::Renderer(const DrawnScene& scene, Samples samples) : state_(std::make_unique<State>()) {
   State& s = *state_;
   require_gl();
-  s.wanted_factor = draws_in_software() && samples == Samples::fast ? 1 : 2;
+  s.wanted_samples = draws_in_software() && samples == Samples::fast ? 1 : 2;
   s.programs.create();
   s.bounds = bounds_of(scene);
   s.origin_m = s.bounds.centre_m;
-  s.objects.resize(scene.objects.size());
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    Object& object = s.objects[i];
-    object.soft = scene.objects[i].soft;
-    object.colour = palette::of_object(scene, i);
-    object.bounds = bounds_of(scene.objects[i].surface);
-    DrawMesh mesh = object.soft ? make_moving_mesh(scene.objects[i].surface, s.origin_m)
-                                : make_draw_mesh(scene.objects[i].surface, s.origin_m);
-    object.lit_by_vertex = s.wanted_factor == 1 && mesh.indices.size() / 3 > kLitByVertex;
-    object.closed = is_closed_outwards(scene.objects[i].surface);
-    std::vector<MeshPart> parts = divide_mesh(mesh);
-    object.mesh.upload(mesh, object.soft ? GL_STREAM_DRAW : GL_STATIC_DRAW);
-    object.mesh.parts = std::move(parts);
-    const std::vector<VertexColour> colours = colours_of_vertices(scene, i);
-    if (object.soft && colours.size() == mesh.vertices.size() && !colours.empty())
-      object.mesh.upload_colours(colours);
-    if (object.soft) object.moving = std::move(mesh);
-  }
-  s.ball.upload(make_unit_ball(), GL_STATIC_DRAW);
-  s.cylinder.upload(make_unit_cylinder(), GL_STATIC_DRAW);
-  s.cone.upload(make_unit_cone(), GL_STATIC_DRAW);
-  s.disc.upload(make_unit_disc(), GL_STATIC_DRAW);
-
+  s.meshes.emplace(scene, s.origin_m, s.wanted_samples == 1);
+  s.ball.upload(make_unit_ball());
+  s.cylinder.upload(make_unit_cylinder());
+  s.cone.upload(make_unit_cone());
+  s.disc.upload(make_unit_disc());
+  s.cover.create();
   s.overlay.create();
   s.targets.create();
   check_gl("uploading the scene");
@@ -257,11 +306,10 @@ Renderer::~Renderer() = default;
 
 void Renderer::release() {
   State& s = *state_;
-  for (Object& object : s.objects) {
-    object.mesh.release();
-    object.face.release();
-  }
+  s.meshes->release();
   for (GlMesh* mesh : {&s.ball, &s.cylinder, &s.cone, &s.disc}) mesh->release();
+  for (RigidLayer& layer : s.layers) layer.layer.release();
+  s.cover.release();
   s.overlay.release();
   s.targets.release();
   s.programs.release();
@@ -275,27 +323,14 @@ void Renderer::set_view(const ViewSettings& view) {
   state_->view = view;
 }
 
-void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height) {
+void Renderer::begin(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue, int width,
+                     int height) {
   State& s = *state_;
   s.width = width, s.height = height;
-  s.factor = s.targets.set_size(width, height, s.wanted_factor);
-  for (std::size_t i = 0; i < s.objects.size(); ++i) {
-    Object& object = s.objects[i];
-    object.placed = place_rigid(snapshot.place_of(i), s.origin_m);
-    if (!object.soft || i >= snapshot.soft_moved_m.size() || i >= scene.objects.size()) continue;
-    const auto& rest = scene.objects[i].surface.vertices;
-    if (snapshot.soft_moved_m[i].size() != rest.size() || rest.size() != object.moving.vertices.size())
-      continue;
-    if (object.moved_m == snapshot.soft_moved_m[i]) continue;
-    object.moved_m = snapshot.soft_moved_m[i];
-    object.most_moved_m = move_vertices(object.moving, rest, object.moved_m, s.origin_m);
-    object.mesh.stream(object.moving);
-    // Displacements below a thousandth of the tool's radius do not start a scale, so that rounding does not
-    // show as a pattern.
-    const double least = 1e-3 * scene.tool_radius_m;
-    if (object.most_moved_m > std::max(s.most_moved_m, least))
-      s.most_moved_m = palette::scale_end(object.most_moved_m);
-  }
+  s.view_number = 0;
+  s.targets.set_size(width, height, s.wanted_samples);
+  s.scale = tissue.scale();
+  s.meshes->move(scene, snapshot, tissue);
   glBindFramebuffer(GL_FRAMEBUFFER, s.targets.scene_frame);
   glDisable(GL_SCISSOR_TEST);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
@@ -309,20 +344,11 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   State& s = *state_;
   if (where.width < 1 || where.height < 1) return;
   const bool tool_known = polygon::is_finite(snapshot.proxy_m) && scene.tool_radius_m > 0.0;
-  double radius = 1.1 * s.bounds.radius_m;
-  for (const glm::dvec3& at : {snapshot.proxy_m, snapshot.device_m, arrow_tip(scene, snapshot, camera)}) {
-    if (polygon::is_finite(at))
-      radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 4.0 * scene.tool_radius_m);
-  }
-  for (std::size_t i = 0; i < s.objects.size(); ++i) {
-    const RigidPlace place = snapshot.place_of(i);
-    const glm::dvec3 at = place(s.objects[i].bounds.centre_m);
-    if (place.moved && polygon::is_finite(at))
-      radius = std::max(radius, glm::length(at - s.bounds.centre_m) + 1.1 * s.objects[i].bounds.radius_m);
-  }
-  s.clip = glm::mat4(camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m,
-                                            s.bounds.centre_m, radius));
-  s.cut_objects(scene, snapshot, camera);
+  const glm::dmat4 clip_from_scene =
+      camera.clip_from_scene(static_cast<double>(where.width) / where.height, s.origin_m, s.bounds.centre_m,
+                             s.meshes->radius_m(scene, snapshot, camera, s.bounds));
+  s.clip = s.seen = glm::mat4(clip_from_scene);
+  s.meshes->cut(scene, snapshot, camera, s.view);
   s.eye = glm::vec3(camera.eye_m() - s.origin_m);
   // Where surfaces coincide, rounding would choose between them pixel by pixel. So rigid surfaces are drawn
   // nearer to the eye by this length. A rigid surface counts as hiding tissue only if it is nearer than the
@@ -330,9 +356,7 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   s.apart = static_cast<float>(kDepthApart * camera.view_height_m());
   s.right = glm::vec3(camera.right());
   s.up = glm::vec3(camera.up());
-  s.nearer = 0.0F;
-  glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_2D, 0);
+  bind_image(0);
   const PixelRect pixels = s.samples_of(where);
   glViewport(pixels.x, pixels.y, pixels.width, pixels.height);
   glScissor(pixels.x, pixels.y, pixels.width, pixels.height);
@@ -342,18 +366,22 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glDepthFunc(GL_LEQUAL);
   glDepthMask(GL_TRUE);
+  RigidLayer& rigid = s.layers[std::min(s.view_number, kViews - 1)];
+  s.draw_rigid_layer(rigid, pixels);
 
   glBindFramebuffer(GL_FRAMEBUFFER, s.targets.scene_frame);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  s.draw_objects(true, Shading::tissue);
+  // The first view lies on the background that begin() has drawn.
+  glClear(s.view_number++ == 0 ? GL_DEPTH_BUFFER_BIT : GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  s.draw_soft();
 
   // The depth of all that must not be hidden: soft objects, the arrow, and a disc a little larger than the
   // tool. Copying the soft objects' depth costs less than drawing them again.
   s.copy_depth(where);
   glBindFramebuffer(GL_FRAMEBUFFER, s.targets.shown_frame);
+  const glm::mat4 disc = place_tool_disc(scene, snapshot.proxy_m, camera, s.origin_m);
   if (tool_known) {
     s.use(Shading::depth);
-    s.place(place_tool_disc(scene, snapshot.proxy_m, camera, s.origin_m));
+    s.place(disc);
     s.disc.draw();
     s.draw_arrow(scene, snapshot, camera);
   }
@@ -369,39 +397,30 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
     s.draw_arrow(scene, snapshot, camera);
   };
   if (tool_known) draw_felt(1.0F);
-  glBindTexture(GL_TEXTURE_2D, s.targets.shown_depth);
-  s.nearer = s.apart;
-  s.draw_objects(false, Shading::unhiding);
-  s.nearer = 0.0F;
+  if (tool_known) s.draw_behind_disc(disc, pixels);
 
   glEnable(GL_BLEND);
   glEnable(GL_CULL_FACE);  // otherwise closed transparent shapes would be blended twice
-  glDepthMask(GL_FALSE);
   if (tool_known) {
+    glDepthMask(GL_FALSE);
     glDepthFunc(GL_GREATER);
     draw_felt(0.28F);
-    const bool device_is_off = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
-    if (device_is_off && polygon::is_finite(snapshot.device_m)) {
-      glDepthFunc(GL_ALWAYS);  // draw always: the device point lies inside an object
-      s.use(Shading::glass);
-      s.uniform("own_colour", palette::device);
-      s.uniform("shine", 0.1F);
-      s.draw_tool(scene, snapshot.device_m);
-    }
     glDepthFunc(GL_LEQUAL);
+    glDepthMask(GL_TRUE);
+  }
+  s.copy_rigid_layer(rigid, pixels, clip_from_scene);
+  const bool device_is_off = glm::length(snapshot.device_m - snapshot.proxy_m) > 0.03 * scene.tool_radius_m;
+  if (tool_known && device_is_off && polygon::is_finite(snapshot.device_m)) {
+    glDepthFunc(GL_ALWAYS);  // draw always: the device point lies inside an object
+    glDepthMask(GL_FALSE);
+    s.use(Shading::glass);
+    s.uniform("own_colour", palette::device);
+    s.uniform("shine", 0.1F);
+    s.draw_tool(scene, snapshot.device_m);
+    glDepthFunc(GL_LEQUAL);
+    glDepthMask(GL_TRUE);
   }
   glDisable(GL_CULL_FACE);
-  // Rigid surfaces in front of soft objects and of the tool: only the nearest surface is blended. A
-  // depth-only pass finds that surface.
-  glDepthMask(GL_TRUE);
-  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  s.nearer = s.apart;
-  s.draw_objects(false, Shading::hiding_depth);
-  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  glDepthFunc(GL_EQUAL);  // draws rigid surfaces that hide nothing once more, in the same colour
-  s.draw_objects(false, Shading::hiding);
-  glDepthFunc(GL_LEQUAL);
-  s.nearer = 0.0F;
   s.draw_translucent();
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
@@ -409,41 +428,23 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
 
 void Renderer::finish(const OverlayMesh& overlay) {
   State& s = *state_;
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, s.targets.scene_frame);
-  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, s.targets.final_frame);
-  glBlitFramebuffer(0, 0, s.width * s.factor, s.height * s.factor, 0, 0, s.width, s.height,
-                    GL_COLOR_BUFFER_BIT, s.factor == 1 ? GL_NEAREST : GL_LINEAR);
-  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.final_frame);
+  if (s.targets.frame() != s.targets.scene_frame) {
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, s.targets.scene_frame);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, s.targets.final_frame);
+    glBlitFramebuffer(0, 0, s.width * s.targets.samples, s.height * s.targets.samples, 0, 0, s.width,
+                      s.height, GL_COLOR_BUFFER_BIT, GL_LINEAR);
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.frame());
   s.overlay.draw(overlay, s.width, s.height);
   check_gl("drawing the scene");
 }
 
 void Renderer::present(int width, int height) {
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, state_->targets.final_frame);
-  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
-  glBlitFramebuffer(0, 0, state_->width, state_->height, 0, 0, width, height, GL_COLOR_BUFFER_BIT,
-                    GL_NEAREST);
-  check_gl("showing a frame");
+  show_frame(state_->targets.frame(), state_->width, state_->height, width, height);
 }
 
 std::vector<std::uint8_t> Renderer::read_rgb() {
-  const State& s = *state_;
-  const auto row = static_cast<std::size_t>(s.width) * 3;
-  std::vector<std::uint8_t> up(row * static_cast<std::size_t>(s.height));
-  std::vector<std::uint8_t> down(up.size());
-  glBindFramebuffer(GL_FRAMEBUFFER, s.targets.final_frame);
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, s.width, s.height, GL_RGB, GL_UNSIGNED_BYTE, up.data());
-  check_gl("reading a frame");
-  for (std::size_t y = 0; y < static_cast<std::size_t>(s.height); ++y) {
-    std::copy_n(up.end() - static_cast<std::ptrdiff_t>((y + 1) * row), row,
-                down.begin() + static_cast<std::ptrdiff_t>(y * row));
-  }
-  return down;
-}
-
-double Renderer::displacement_scale_m() const {
-  return state_->most_moved_m;
+  return read_frame(state_->targets.frame(), state_->width, state_->height);
 }
 
 }  // namespace hybrid

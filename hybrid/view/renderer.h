@@ -13,8 +13,9 @@
 
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
-#include "hybrid/view/gl_objects.h"
+#include "hybrid/view/gl/gl_objects.h"
 #include "hybrid/view/layout.h"
+#include "hybrid/view/tissue_view.h"
 #include "hybrid/view/view_settings.h"
 
 namespace hybrid {
@@ -42,9 +43,11 @@ class Renderer {
   // Sets how the following frames show the scene.
   void set_view(const ViewSettings& view);
   // Starts a frame and uploads the snapshot's moving vertices. Width and height are 1 to 8192 pixels;
-  // otherwise throws std::runtime_error. `scene` must be the scene that the renderer was made from.
-  void begin(const DrawnScene& scene, const Snapshot& snapshot, int width, int height);
-  // Draws the scene into a part of the frame, over its content.
+  // otherwise throws std::runtime_error. `tissue` has taken the snapshot. `scene` must be the scene that the
+  // renderer was made from.
+  void begin(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue, int width,
+             int height);
+  // Draws the scene into a part of the frame, over its content. A frame has two such views at most.
   void draw(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const PixelRect& where);
   // Draws the overlay and ends the frame. Throws std::runtime_error on an OpenGL error anywhere in the frame.
   void finish(const OverlayMesh& overlay);
@@ -53,10 +56,6 @@ class Renderer {
   void present(int width, int height);
   // Returns the finished frame: rows from the top, three bytes (RGB) a pixel.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb();
-
-  // Displacement at the end of the colour scale (m). It is a round number that never falls, so that colours
-  // keep their meaning from frame to frame.
-  [[nodiscard]] double displacement_scale_m() const;
 
  private:
   struct State;

@@ -2,11 +2,32 @@
 #include "hybrid/view/view_settings.h"
 
 #include <algorithm>
+#include <glm/common.hpp>
+
+#include "polygon/mesh/is_finite.h"
 
 namespace hybrid {
 
 double clip_place_m(const ClipPlane& clip, const SceneBounds& bounds) {
   return bounds.centre_m[clip.axis] + (2.0 * std::clamp(clip.share, 0.0, 1.0) - 1.0) * bounds.radius_m;
+}
+
+SoftBox soft_box(const DrawnScene& scene) {
+  SoftBox box;
+  for (const DrawnObject& object : scene.objects) {
+    if (!object.soft) continue;
+    for (const glm::dvec3& v : object.surface.vertices) {
+      if (!polygon::is_finite(v)) continue;
+      box.low_m = box.empty ? v : glm::min(box.low_m, v);
+      box.high_m = box.empty ? v : glm::max(box.high_m, v);
+      box.empty = false;
+    }
+  }
+  return box;
+}
+
+bool has_soft(const DrawnScene& scene) {
+  return std::ranges::any_of(scene.objects, [](const DrawnObject& object) { return object.soft; });
 }
 
 std::optional<glm::vec4> clip_equation(const ClipPlane& clip, const SceneBounds& bounds,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hybrid/view/camera.h"
+#include "hybrid/view/tissue/tissue_field.h"
 
 namespace hybrid {
 
@@ -23,15 +24,42 @@ struct ClipPlane {
   bool other_side = false;  // the part before the plane is left out instead
 };
 
+// A plane through all soft objects, perpendicular to an axis. The tissue in it at rest is drawn where it is
+// now.
+struct SlicePlane {
+  bool on = false;
+  double share = 0.5;  // place along the axis within SoftBox, 0 to 1
+
+  friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
+};
+
+// The smallest box along the scene's axes that contains all soft objects at rest (m).
+struct SoftBox {
+  glm::dvec3 low_m{0.0}, high_m{0.0};
+  bool empty = true;
+
+  // Coordinate of a slice along its axis.
+  [[nodiscard]] double place_m(std::size_t axis, double share) const {
+    const auto d = static_cast<int>(axis);
+    return low_m[d] + share * (high_m[d] - low_m[d]);
+  }
+};
+[[nodiscard]] SoftBox soft_box(const DrawnScene& scene);
+[[nodiscard]] bool has_soft(const DrawnScene& scene);
+
 struct ViewSettings {
   std::vector<ObjectLook> looks;  // [object]; further objects have the default
   ClipPlane clip;
+  std::array<SlicePlane, 3> slices;  // [axis]
+  bool grey = false;                 // slices show the scan's grey values, where there is a scan
+  TissueColour colour = TissueColour::displacement;
   bool dark = false;
   bool inset = true;  // a nearer view of the contact
 
   [[nodiscard]] ObjectLook look_of(std::size_t object) const {
     return object < looks.size() ? looks[object] : ObjectLook{};
   }
+  [[nodiscard]] bool sliced() const { return slices[0].on || slices[1].on || slices[2].on; }
 };
 
 // Coefficients of the plane, relative to `origin_m`. Its positive side is drawn. Empty: nothing is clipped.

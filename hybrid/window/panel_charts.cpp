@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "hybrid/base/number_text.h"
 #include "hybrid/view/overlay.h"
@@ -14,14 +16,25 @@ constexpr double kPeriod_us = 1000.0;  // period of a servo loop at 1 kHz: the l
 
 // Colours of the series. They differ in hue and in lightness (after Okabe & Ito 2008), on light and dark
 // paper.
-constexpr std::array<glm::vec3, kForceSeries> kSeries{
-    {{0.03F, 0.38F, 0.93F}, {0.84F, 0.37F, 0.00F}, {0.00F, 0.62F, 0.45F}}};
-constexpr std::array<const char*, kForceSeries> kSeriesNames{"total", "rigid", "soft"};
+constexpr std::array<glm::vec3, kForceSeries> kSeries{{{0.03F, 0.38F, 0.93F},
+                                                       {0.84F, 0.37F, 0.00F},
+                                                       {0.00F, 0.62F, 0.45F},
+                                                       {0.80F, 0.47F, 0.65F},
+                                                       {0.34F, 0.71F, 0.91F},
+                                                       {0.55F, 0.55F, 0.55F},
+                                                       {0.90F, 0.62F, 0.00F}}};
+constexpr std::array<const char*, kForceSeries> kSeriesNames{
+    "total", "rigid", "soft", "friction", "damping, texture", "limits", "passivity"};
+constexpr std::size_t kAlways = 3;  // the first series are always named; the others if they occur
+// A part that stays below this share of the chart's height does not occur.
+constexpr double kLeastShown = 0.005;
 
 // For example "85.2 µs" or "1.23 ms".
 std::string tick_time_text(double us) {
   return us < kPeriod_us ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
 }
+
+constexpr float kKeyRow = 1.35F;  // row pitch of the names of series (em)
 
 struct ChartBox {
   float left, right, top, bottom;  // edges of the plot (pixels)
@@ -35,14 +48,30 @@ double axis_end(double most) {
   return end;
 }
 
-void draw_keys(const Pen& pen, float right, float y) {
-  float x = right;
-  for (std::size_t s = kForceSeries; s-- > 0;) {
-    x -= pen.width(kSeriesNames[s]);
-    pen.text(x, y, pen.inks.text, kSeriesNames[s]);
-    x -= 0.9F * pen.em;
-    pen.fill({x, y + 0.3F * pen.em}, {x + 0.6F * pen.em, y + 0.9F * pen.em}, ink_of(kSeries[s]), 1.0F);
-    x -= 0.7F * pen.em;
+// The series that the chart shows: the total first, then those that cover others least.
+std::vector<ForceSeries> shown_series(const TickHistory& history, double top_N) {
+  std::vector<ForceSeries> shown{ForceSeries::total, ForceSeries::soft, ForceSeries::rigid};
+  for (std::size_t s = kAlways; s < kForceSeries; ++s) {
+    const auto series = static_cast<ForceSeries>(s);
+    if (history.most_N(series) > kLeastShown * top_N) shown.push_back(series);
+  }
+  return shown;
+}
+
+// Names the series in rows of at most kAlways and, below, of the others.
+void draw_keys(const Pen& pen, float right, float y, std::span<const ForceSeries> shown) {
+  for (const bool first : {true, false}) {
+    float x = right;
+    for (std::size_t s = kForceSeries; s-- > 0;) {
+      if ((s < kAlways) != first || std::ranges::find(shown, static_cast<ForceSeries>(s)) == shown.end())
+        continue;
+      x -= pen.width(kSeriesNames[s]);
+      pen.text(x, y, pen.inks.text, kSeriesNames[s]);
+      x -= 0.9F * pen.em;
+      pen.fill({x, y + 0.3F * pen.em}, {x + 0.6F * pen.em, y + 0.9F * pen.em}, ink_of(kSeries[s]), 1.0F);
+      x -= 0.7F * pen.em;
+    }
+    y += kKeyRow * pen.em;
   }
 }
 
@@ -84,16 +113,17 @@ void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory&
   const auto x1 = x0 + static_cast<float>(where.width), y1 = y0 + static_cast<float>(where.height);
   const double top_N = axis_end(history.most_N());
   const std::string top = force_text(top_N);
-  const ChartBox box{x0 + pen.width(top) + 0.5F * em, x1, y0 + 1.7F * em, y1 - 1.5F * em};
+  const std::vector<ForceSeries> shown = shown_series(history, top_N);
+  const float keys = shown.size() > kAlways ? kKeyRow : 0.0F;
+  const ChartBox box{x0 + pen.width(top) + 0.5F * em, x1, y0 + (1.7F + keys) * em, y1 - 1.5F * em};
   for (int line = 0; line <= 2; ++line) {
     const float y = box.bottom - 0.5F * static_cast<float>(line) * (box.bottom - box.top);
     pen.line({box.left, y}, {box.right, y}, pen.inks.edge);
     const std::string words = line == 0 ? "0" : line == 2 ? top : std::string();
     pen.text(box.left - 0.5F * em - pen.width(words), y - 0.6F * em, pen.inks.pale, words);
   }
-  draw_keys(pen, box.right, y0);
-  for (const ForceSeries series : {ForceSeries::total, ForceSeries::soft, ForceSeries::rigid})
-    draw_series(pen, box, history, series, top_N);
+  draw_keys(pen, box.right, y0, shown);
+  for (const ForceSeries series : shown) draw_series(pen, box, history, series, top_N);
   const std::string from = "-" + with_decimals(history.seconds(), 0) + " s", to = "now";
   pen.text(box.left, box.bottom + 0.3F * em, pen.inks.pale, from);
   pen.text(box.right - pen.width(to), box.bottom + 0.3F * em, pen.inks.pale, to);

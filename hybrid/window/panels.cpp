@@ -10,6 +10,7 @@
 #include "hybrid/view/legend.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
+#include "hybrid/window/panel_words.h"
 
 namespace hybrid {
 namespace {
@@ -39,7 +40,7 @@ void hand_over(ImGuiIO& io, const UiInput& input) {
 
 constexpr const char* kPanelName = "panel";
 // heights (unit: body text)
-constexpr float kForceChart_em = 7.0F, kTickChart_em = 6.0F, kStageRow_em = 1.25F;
+constexpr float kForceChart_em = 8.5F, kTickChart_em = 6.0F, kStageRow_em = 1.25F;
 constexpr std::array<double, 3> kSpeeds{1.0, 0.1, 0.01};  // of the session, relative to real time
 
 ImVec4 colour_of(Ink ink, float alpha = 1.0F) {
@@ -99,41 +100,6 @@ bool wide_button(const char* words, int of, bool lit = false) {
 
 bool open_section(const char* name, bool open = true) {
   return ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
-}
-
-std::string object_name(const DrawnScene& scene, std::uint32_t object) {
-  if (object == Edit::kTool) return "tool";
-  return object < scene.objects.size() ? scene.objects[object].name : std::string();
-}
-
-// The format of a slider's number: three digits at least, and never an exponent for a large number.
-std::string number_format(float shown) {
-  return shown >= 99.95F ? "%.0f" : shown >= 9.995F ? "%.1f" : shown >= 0.9995F ? "%.2f" : "%.3g";
-}
-
-bool has_soft(const DrawnScene& scene) {
-  return std::any_of(scene.objects.begin(), scene.objects.end(),
-                     [](const DrawnObject& object) { return object.soft; });
-}
-
-std::string words_of_value(EditedQuantity quantity) {
-  switch (quantity) {
-    case EditedQuantity::coupling_stiffness:
-      return "coupling";
-    case EditedQuantity::max_force:
-      return "force limit";
-    case EditedQuantity::static_friction:
-      return "friction at rest";
-    case EditedQuantity::dynamic_friction:
-      return "friction sliding";
-    case EditedQuantity::damping:
-      return "damping";
-    case EditedQuantity::texture_height:
-      return "texture height";
-    case EditedQuantity::tissue_factor:
-      return "stiffness, times";
-  }
-  return {};
 }
 
 // Reserves a place for a chart in the panel, and moves the cursor below it.
@@ -339,6 +305,10 @@ void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame
     if (n > 0) ImGui::SameLine();
     if (ImGui::Button(look_words[n], {n < 2 ? wide : narrow, 0.0F})) ask(ViewVerb::look, {}, looks[n]);
   }
+  if (std::exchange(bounds_of_, &scene) != &scene) {
+    bounds_ = bounds_of(scene);
+    box_ = soft_box(scene);
+  }
   bool clip = view.clip.on;
   if (ImGui::Checkbox("clip", &clip)) ask(ViewVerb::clip, {clip ? 1.0 : 0.0});
   for (int axis = 0; axis < 3; ++axis) {
@@ -352,16 +322,55 @@ void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame
   if (ImGui::Checkbox("other side", &other)) ask(ViewVerb::clip_side);
   if (clip) {
     auto share = static_cast<float>(view.clip.share);
-    if (std::exchange(bounds_of_, &scene) != &scene) bounds_ = bounds_of(scene);
     const std::string place = length_text(clip_place_m(view.clip, bounds_));
     label_beside(pen, "at");
     if (ImGui::SliderFloat("##clip", &share, 0.0F, 1.0F, place.c_str(), ImGuiSliderFlags_AlwaysClamp))
       ask(ViewVerb::clip_place, {static_cast<double>(share)});
   }
+  if (!box_.empty) draw_tissue_view(pen, view, result);
   bool inset = view.inset, dark = view.dark;
   if (ImGui::Checkbox("near view", &inset)) ask(ViewVerb::inset, {inset ? 1.0 : 0.0});
   ImGui::SameLine();
   if (ImGui::Checkbox("dark", &dark)) ask(ViewVerb::dark, {dark ? 1.0 : 0.0});
+}
+
+void Panels::draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const {
+  const auto ask = [&](ViewVerb verb, std::vector<double> numbers) {
+    result.actions.push_back({.verb = verb, .numbers = std::move(numbers)});
+  };
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted("slices");
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    static constexpr std::array<const char*, 3> names{"x##slice", "y##slice", "z##slice"};
+    ImGui::SameLine();
+    bool on = view.slices[axis].on;
+    if (ImGui::Checkbox(names[axis], &on))
+      ask(ViewVerb::slice, {static_cast<double>(axis), on ? view.slices[axis].share : -1.0});
+  }
+  ImGui::SameLine();
+  bool grey = view.grey;
+  if (ImGui::Checkbox("grey values", &grey)) ask(ViewVerb::slice_grey, {grey ? 1.0 : 0.0});
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("Slices show the scan that the tissue was made from, where the scene names one");
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!view.slices[axis].on) continue;
+    static constexpr std::array<const char*, 3> names{"slice x", "slice y", "slice z"};
+    auto share = static_cast<float>(view.slices[axis].share);
+    label_beside(pen, names[axis]);
+    const std::string place = length_text(box_.place_m(axis, view.slices[axis].share));
+    ImGui::PushID(names[axis]);
+    if (ImGui::SliderFloat("##place", &share, 0.0F, 1.0F, place.c_str(), ImGuiSliderFlags_AlwaysClamp))
+      ask(ViewVerb::slice, {static_cast<double>(axis), static_cast<double>(share)});
+    ImGui::PopID();
+  }
+  label_beside(pen, "tissue shows");
+  if (ImGui::BeginCombo("##colour", kTissueColours[static_cast<std::size_t>(view.colour)].data())) {
+    for (std::size_t n = 0; n < kTissueColours.size(); ++n) {
+      if (ImGui::Selectable(kTissueColours[n].data(), static_cast<std::size_t>(view.colour) == n))
+        ask(ViewVerb::colour, {static_cast<double>(n)});
+    }
+    ImGui::EndCombo();
+  }
 }
 
 void Panels::take_input() {

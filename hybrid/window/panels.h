@@ -62,11 +62,13 @@ class Panels final : public OverlayPanel {
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
                    PanelResult& result);
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
+  void draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const;
 
   const PanelFrame* frame_ = nullptr;
-  // The scene to which bounds_ belongs. The bounds are kept, because computing them visits every vertex.
+  // The scene to which bounds_ and box_ belong. They are kept, because computing them visits every vertex.
   const DrawnScene* bounds_of_ = nullptr;
   SceneBounds bounds_;
+  SoftBox box_;
   PanelResult result_;
   // The slider that the user moves, and the last value that the panel requested. The session applies it a
   // frame later.

@@ -15,6 +15,14 @@ float force_of(const TickSample& sample, ForceSeries series) noexcept {
       return sample.rigid_N;
     case ForceSeries::soft:
       return sample.soft_N;
+    case ForceSeries::friction:
+      return sample.friction_N;
+    case ForceSeries::damping:
+      return sample.damping_N;
+    case ForceSeries::limits:
+      return sample.limits_N;
+    case ForceSeries::passivity:
+      return sample.passivity_N;
     default:
       return sample.total_N;
   }
@@ -63,13 +71,19 @@ std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series,
   return columns;
 }
 
-double TickHistory::most_N() const {
+double TickHistory::most_N(ForceSeries series) const {
   float most = 0.0F;
   for (const TickSample& sample : samples_) {
-    for (const float force : {sample.total_N, sample.rigid_N, sample.soft_N})
-      if (std::isfinite(force)) most = std::max(most, force);
+    const float force = force_of(sample, series);
+    if (std::isfinite(force)) most = std::max(most, force);
   }
   return static_cast<double>(most);
+}
+
+double TickHistory::most_N() const {
+  double most = 0.0;
+  for (std::size_t s = 0; s < kForceSeries; ++s) most = std::max(most, most_N(static_cast<ForceSeries>(s)));
+  return most;
 }
 
 TickTimes TickHistory::times() const {

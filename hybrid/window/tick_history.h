@@ -13,9 +13,10 @@
 
 namespace hybrid {
 
-// The total force, or its part from rigid or from soft objects.
-enum class ForceSeries : std::uint8_t { total, rigid, soft };
-inline constexpr std::size_t kForceSeries = 3;
+// The total force, its part from rigid or from soft objects, and further parts (TickResult). Damping includes
+// texture. Limits and passivity are what these take away.
+enum class ForceSeries : std::uint8_t { total, rigid, soft, friction, damping, limits, passivity };
+inline constexpr std::size_t kForceSeries = 7;
 
 struct ColumnRange {
   float least_N = 0.0F, most_N = 0.0F;
@@ -47,7 +48,8 @@ class TickHistory {
 
   // The range of forces in each of `count` columns, the newest last. Empty: no tick is in the column.
   [[nodiscard]] std::vector<std::optional<ColumnRange>> columns(ForceSeries series, std::size_t count) const;
-  [[nodiscard]] double most_N() const;  // largest force of all series
+  [[nodiscard]] double most_N(ForceSeries series) const;  // largest force
+  [[nodiscard]] double most_N() const;                    // of all series
   [[nodiscard]] TickTimes times() const;
 
  private:

@@ -65,8 +65,7 @@ void require_ffmpeg() {
   }
   throw std::runtime_error(
       "--video needs the program ffmpeg, and it is not installed (on Debian the package ffmpeg); install it, "
-      "or "
-      "write the frames as pictures with --out FOLDER");
+      "or write the frames as pictures: hybrid view SCENE --frames N --out FOLDER");
 }
 
 VideoFile::VideoFile(const std::filesystem::path& file, int width, int height, int frames_per_s)

@@ -24,6 +24,8 @@ enum class ScriptArguments : std::uint8_t {
   edit,           // an object or "tool", a quantity, and a value in the panel's unit
   look,           // "all", "contact", "x", "y" or "z"
   clip,           // "off", or an axis and a number
+  slice,          // "off", or an axis, and a number or "off"
+  colour,         // one of kTissueColours
   file,           // a file name; may be left out
   key,
   point,  // two numbers
@@ -35,7 +37,7 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 22> kScriptCommands{
+constexpr std::array<ScriptCommand, 25> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
      {"speed", ViewVerb::speed, ScriptArguments::number, "speed 0.1"},
@@ -46,6 +48,9 @@ constexpr std::array<ScriptCommand, 22> kScriptCommands{
      {"hide", ViewVerb::show, ScriptArguments::object, "hide bone"},
      {"opacity", ViewVerb::opacity, ScriptArguments::object_number, "opacity bone 0.3"},
      {"clip", ViewVerb::clip, ScriptArguments::clip, "clip x 0.5"},
+     {"slice", ViewVerb::slice, ScriptArguments::slice, "slice y 0.4"},
+     {"grey", ViewVerb::slice_grey, ScriptArguments::on_or_off, "grey on"},
+     {"colour", ViewVerb::colour, ScriptArguments::colour, "colour strain"},
      {"look", ViewVerb::look, ScriptArguments::look, "look contact"},
      {"dark", ViewVerb::dark, ScriptArguments::on_or_off, "dark on"},
      {"panels", ViewVerb::panels, ScriptArguments::on_or_off, "panels off"},
@@ -155,14 +160,29 @@ class ScriptLine {
            (names.empty() ? "" : "; it has " + names));
   }
 
+  [[nodiscard]] double axis(std::size_t n) const {
+    static constexpr std::string_view axes = "xyz";
+    const std::size_t axis = words_[n].size() == 1 ? axes.find(words_[n]) : std::string_view::npos;
+    if (axis == std::string_view::npos)
+      refuse("'" + words_[n] + "' is no axis; write x, y, z or off" + example());
+    return static_cast<double>(axis);
+  }
+
   void read_clip(ViewAction& action) const {
     expect(1, 2);
-    static constexpr std::string_view axes = "xyz";
-    const std::size_t axis = words_[2].size() == 1 ? axes.find(words_[2]) : std::string_view::npos;
-    if (words_[2] != "off" && axis == std::string_view::npos)
-      refuse("'" + words_[2] + "' is no axis; write x, y, z or off" + example());
     action.numbers = {0.0};
-    if (words_[2] != "off") action.numbers = {1.0, static_cast<double>(axis), number(3, 0.0, 1.0)};
+    if (words_[2] != "off") action.numbers = {1.0, axis(2), number(3, 0.0, 1.0)};
+  }
+
+  void read_slice(ViewAction& action) const {
+    expect(1, 2);
+    if (words_[2] == "off") {
+      expect(1, 1);
+      action.numbers = {-1.0};
+      return;
+    }
+    const bool off = words_.size() > 3 && words_[3] == "off";
+    action.numbers = {axis(2), off ? -1.0 : number(3, 0.0, 1.0)};
   }
 
   void read_arguments(const ScriptCommand& command, ViewAction& action) const {
@@ -202,6 +222,17 @@ class ScriptLine {
         break;
       case ScriptArguments::clip:
         read_clip(action);
+        break;
+      case ScriptArguments::slice:
+        read_slice(action);
+        break;
+      case ScriptArguments::colour:
+        expect(1, 1);
+        if (const auto named = tissue_colour_named(words_[2])) {
+          action.numbers = {static_cast<double>(*named)};
+        } else {
+          refuse("'" + words_[2] + "' is no colouring" + example());
+        }
         break;
       case ScriptArguments::file:
         expect(0, 1);
@@ -249,6 +280,11 @@ ViewScript::ViewScript(const std::string& text, const std::string& file, const D
     if (action.verb == ViewVerb::clip && action.numbers.size() == 3) {
       actions_.push_back({t_s, {.verb = ViewVerb::clip_axis, .numbers = {action.numbers[1]}}});
       actions_.push_back({t_s, {.verb = ViewVerb::clip_place, .numbers = {action.numbers[2]}}});
+    }
+    if (action.verb == ViewVerb::slice && action.numbers.size() == 1) {
+      for (const double axis : {0.0, 1.0, 2.0})
+        actions_.push_back({t_s, {.verb = ViewVerb::slice, .numbers = {axis, -1.0}}});
+      continue;
     }
     actions_.push_back({t_s, action});
   }

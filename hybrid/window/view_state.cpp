@@ -19,6 +19,17 @@ ObjectLook& look_in(ViewSettings& view, std::uint32_t object) {
   return view.looks[object];
 }
 
+void move_slice(ViewSettings& view, const std::vector<double>& numbers) {
+  if (numbers.size() < 2) {
+    const bool on = !view.sliced();
+    for (SlicePlane& slice : view.slices) slice.on = on;
+    return;
+  }
+  SlicePlane& slice = view.slices[static_cast<std::size_t>(std::clamp(numbers[0], 0.0, 2.0))];
+  slice.on = numbers[1] >= 0.0;
+  if (slice.on) slice.share = std::min(numbers[1], 1.0);
+}
+
 void act_on_view(ViewState& state, const ViewAction& action) {
   ViewSettings& view = state.view;
   switch (action.verb) {
@@ -40,6 +51,18 @@ void act_on_view(ViewState& state, const ViewAction& action) {
       break;
     case ViewVerb::clip_side:
       view.clip.other_side = !view.clip.other_side;
+      break;
+    case ViewVerb::slice:
+      move_slice(view, action.numbers);
+      break;
+    case ViewVerb::slice_grey:
+      set_or_flip(view.grey, action);
+      break;
+    case ViewVerb::colour:
+      view.colour = static_cast<TissueColour>(
+          std::clamp(static_cast<int>(number_of(action, static_cast<double>(view.colour) + 1.0)), 0,
+                     static_cast<int>(kTissueColours.size())) %
+          static_cast<int>(kTissueColours.size()));
       break;
     case ViewVerb::dark:
       set_or_flip(view.dark, action);

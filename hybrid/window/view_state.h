@@ -26,6 +26,9 @@ enum class ViewVerb : std::uint8_t {
   clip_axis,       // numbers: 0 x, 1 y, 2 z
   clip_place,      // numbers: 0 to 1 along the axis
   clip_side,       // leaves out the other side
+  slice,           // numbers: axis (0 x, 1 y, 2 z), place 0 to 1, or negative: off; none: all on or all off
+  slice_grey,      // numbers: 1 grey values of the scan, 0 materials, none: toggle
+  colour,          // numbers: TissueColour; none: the next one
   look,            // text: "all", "contact", "x", "y", "z"
   dark,            // numbers: 1 dark, 0 light, none: toggle
   panels,          // numbers: 1 shown, 0 hidden, none: toggle

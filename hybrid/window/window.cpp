@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "hybrid/view/frame_painter.h"
+#include "hybrid/window/script_events.h"
 #include "hybrid/window/window_keys.h"
 
 namespace hybrid {
@@ -49,10 +50,9 @@ struct CloseWindow {
   void operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
 };
 
-enum class Drag { none, orbit, pan, tool };
+enum class Drag { none, orbit, pan, tool, slice };
 
 constexpr int kMostPixels = 8192;    // most pixels along a side of a frame
-constexpr int kDragFrames = 12;      // frames that a script's drag takes
 constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets
 
 struct NamedKey {
@@ -81,19 +81,6 @@ constexpr std::array<NamedKey, 17> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::t
 constexpr std::array<std::pair<char, UiKey>, 6> kLetters{
     {{'a', UiKey::a}, {'c', UiKey::c}, {'v', UiKey::v}, {'x', UiKey::x}, {'y', UiKey::y}, {'z', UiKey::z}}};
 
-// One step of a script's use of mouse and keyboard.
-struct ScriptEvent {
-  enum class Kind : std::uint8_t { move, press, release, key_down, key_up, wheel, next_frame } kind;
-  double x = 0.0, y = 0.0;
-  int button = GLFW_MOUSE_BUTTON_LEFT;
-  std::string key{};
-};
-
-int button_named(std::string_view name) {
-  if (name == "right") return GLFW_MOUSE_BUTTON_RIGHT;
-  return name == "middle" ? GLFW_MOUSE_BUTTON_MIDDLE : GLFW_MOUSE_BUTTON_LEFT;
-}
-
 }  // namespace
 
 struct Window::State {
@@ -111,6 +98,8 @@ struct Window::State {
   // device, because contact could then push the goal away.
   glm::dvec3 drag_plane_m{0.0};
   glm::dvec3 device_m{0.0};  // device position in the last frame
+  SoftBox box;               // of the scene
+  std::size_t dragged_slice = 0;
   std::optional<glm::dvec3> goal_m;
   ViewState user;
   UiInput input;
@@ -124,7 +113,7 @@ struct Window::State {
   FrameLayout layout;  // layout of the last frame
 
   State(const DrawnScene& drawn, const WindowOptions& options)
-      : scene(&drawn), history(options.history_s), visible(options.visible) {
+      : scene(&drawn), box(soft_box(drawn)), history(options.history_s), visible(options.visible) {
     user.panels = options.panels;
   }
 
@@ -163,8 +152,19 @@ struct Window::State {
       case Drag::tool:
         goal_m = under_pointer() + grip_m;
         break;
+      case Drag::slice:
+        drag_slice({dx, dy});
+        break;
       case Drag::none:
         break;
+    }
+  }
+
+  void drag_slice(const glm::dvec2& motion) {
+    for (const SliceFrame& frame : slice_frames(box, user.view)) {
+      if (frame.axis != dragged_slice) continue;
+      double& share = user.view.slices[frame.axis].share;
+      share = std::clamp(share + dragged_share(frame, box, camera, layout.scene, motion), 0.0, 1.0);
     }
   }
 
@@ -197,7 +197,10 @@ struct Window::State {
       grip_m = drag_plane_m - under_pointer();
       goal_m = drag_plane_m;
     } else if (which == GLFW_MOUSE_BUTTON_LEFT) {
-      drag = Drag::orbit;
+      const auto slice =
+          slice_at(slice_frames(box, user.view), camera, layout.scene, {x, y}, text_height(height));
+      drag = slice ? Drag::slice : Drag::orbit;
+      dragged_slice = slice.value_or(0);
     }
   }
 
@@ -246,36 +249,6 @@ struct Window::State {
     key({&name, 1}, action == GLFW_PRESS);
   }
 
-  // Turns an action of mouse or keyboard into events.
-  void enact(const ViewAction& action) {
-    using Kind = ScriptEvent::Kind;
-    const auto number = [&](std::size_t n) { return n < action.numbers.size() ? action.numbers[n] : 0.0; };
-    const auto add = [&](Kind kind, double at_x = 0.0, double at_y = 0.0) {
-      events.push_back({kind, at_x, at_y, button_named(action.text), action.text});
-    };
-    if (action.verb == ViewVerb::key) {
-      add(Kind::key_down);
-      add(Kind::next_frame);
-      add(Kind::key_up);
-    } else if (action.verb == ViewVerb::wheel) {
-      add(Kind::wheel, number(0));
-    } else {
-      const bool drags = action.verb == ViewVerb::drag;
-      add(Kind::move, number(0), number(1));
-      add(Kind::next_frame);
-      add(Kind::press);
-      add(Kind::next_frame);
-      for (int n = 1; drags && n <= kDragFrames; ++n) {
-        const double share = static_cast<double>(n) / kDragFrames;
-        add(Kind::move, number(0) + share * (number(2) - number(0)),
-            number(1) + share * (number(3) - number(1)));
-        add(Kind::next_frame);
-      }
-      add(Kind::release);
-    }
-    add(Kind::next_frame);
-  }
-
   // Plays the script's events of this frame.
   void play_events() {
     using Kind = ScriptEvent::Kind;
@@ -285,7 +258,7 @@ struct Window::State {
       if (event.kind == Kind::next_frame) return;
       if (event.kind == Kind::move) move_to(event.x, event.y);
       if (event.kind == Kind::press || event.kind == Kind::release)
-        button(event.button, event.kind == Kind::press, false);
+        button(static_cast<int>(event.button), event.kind == Kind::press, false);
       if (event.kind == Kind::key_down || event.kind == Kind::key_up)
         key(event.key, event.kind == Kind::key_down);
       if (event.kind == Kind::wheel) wheel(event.x);
@@ -374,6 +347,7 @@ void Window::show_scene(const DrawnScene& scene) {
   glfwMakeContextCurrent(s.window.get());
   s.painter->release();
   s.scene = &scene;
+  s.box = soft_box(scene);
   s.painter.emplace(scene, Samples::fast, s.height);
   s.history.clear();
   if (s.user.selected != Edit::kTool && s.user.selected >= scene.objects.size())
@@ -390,7 +364,7 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   s.measure_frame();
   glfwGetFramebufferSize(handle, &s.width, &s.height);
   if (s.width < 1 || s.height < 1) return true;  // minimised: there is nothing to draw
-  s.layout = frame_layout(s.width, s.height, true, s.user.panels);
+  s.layout = frame_layout(s.width, s.height, true, s.user.panels, !s.box.empty);
   s.choose_view(snapshot);
   glfwMakeContextCurrent(handle);
   s.paint(snapshot, notes);
@@ -410,7 +384,7 @@ void Window::act(const ViewAction& action) {
     case ViewVerb::click:
     case ViewVerb::drag:
     case ViewVerb::wheel:
-      state_->enact(action);
+      add_events(state_->events, action);
       break;
     default:
       hybrid::act(state_->user, action);
@@ -425,6 +399,7 @@ WindowInput Window::take_input() {
           .speed = s.user.speed,
           .restarts = s.user.restarts,
           .single_ticks = s.user.single_ticks,
+          .asked = s.painter->asked(s.user.view),
           .edits = std::exchange(s.user.edits, {}),
           .recording = std::exchange(s.user.recording, {}),
           .save_scene = std::exchange(s.user.save_scene, false),

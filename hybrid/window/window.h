@@ -32,6 +32,7 @@ struct WindowInput {
   bool wants_presses = false;  // the frame shows Snapshot::presses
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
+  std::shared_ptr<const AskedPoints> asked;      // points whose displacements the next frame needs, or null
   // ---- since the last call ----
   std::vector<Edit> edits;
   std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name

@@ -12,7 +12,7 @@ namespace hybrid {
 // The line of help below the scene.
 inline constexpr std::string_view kWindowHelp =
     "drag: orbit   wheel: zoom   right drag: pull the tool   space: pause   N: tick   F C X Y Z: views   "
-    "K: clip   Tab: keys to panel   H: panel";
+    "K: clip   V: slices   M: colours   Tab: keys to panel   H: panel";
 
 // Action of a key: "space", "escape", "[", "a" to "z", "0" to "9", …. `control`: the Ctrl key is held. Empty:
 // the key has no action.

@@ -11,6 +11,7 @@
 
 #include "hybrid/session/recording.h"
 #include "hybrid/session/session.h"
+#include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 #include "tests/interface/c_session.h"

@@ -81,6 +81,7 @@ class SoftObject {
   [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
 
   [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
+  [[nodiscard]] const std::shared_ptr<const Lattice>& shared_lattice() const { return lattice_; }
   [[nodiscard]] const Displacement& state() const { return state_; }
   // Displacement of a voxel (unit: meter). state() has it only if the object does not use patches (see
   // below).

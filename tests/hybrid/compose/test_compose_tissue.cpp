@@ -177,6 +177,26 @@ TEST_F(ComposedTissue, LinksGetTheRatioForWhichTheyAreRightAndTheSameContactModu
 
 // ---- a volume without labels
 
+TEST_F(ComposedTissue, NamesTheScanForPictures) {
+  const voxel::LabelVolume volume = tests::volume_of(tests::torso());
+  ComposeOptions options = of(volume);
+  voxel::save_volume(folder_ / "ct.nii.gz", volume);
+  options.inputs = {folder_ / "ct.nii.gz"};
+  const hybrid::Scene scene = hybrid::load_scene(hybrid::compose(options).scene);
+  const auto scan_of = [](const hybrid::Scene& s) {
+    return std::get<hybrid::VolumeSource>(s.soft[0].source).scan;
+  };
+  EXPECT_EQ(scan_of(scene), fs::absolute(folder_ / "ct.nii.gz"));
+  ComposeOptions whole;
+  whole.inputs = options.inputs;
+  whole.range = {0.5, 9.0};
+  whole.out = folder_ / "whole";
+  EXPECT_EQ(scan_of(hybrid::load_scene(hybrid::compose(whole).scene)), fs::absolute(folder_ / "ct.nii.gz"));
+  // A scan that is gone does not keep a scene from being felt.
+  fs::remove(folder_ / "ct.nii.gz");
+  EXPECT_NO_THROW((void)hybrid::build_scene(hybrid::load_scene(folder_ / "whole" / "scene.toml")));
+}
+
 TEST_F(ComposedTissue, BoneOfAScanWithoutLabelsIsSaidUnlessToldWhatIsTissue) {
   // A cube of 40 HU in air, with 12 voxels a side. Its core, with 4 voxels a side, is bone.
   std::string data;

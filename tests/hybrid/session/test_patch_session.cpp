@@ -88,11 +88,25 @@ TEST_F(GridSession, TheWindowShowsTheDent) {
   const auto shown = [&] {
     hybrid::Snapshot snapshot, live;
     hybrid::fill_moved_near(touch.world(), touch.state(), snapshot);
-    hybrid::merge_live_surface(drawn, snapshot, {}, live);
+    hybrid::merge_live_surface(drawn, snapshot, {}, nullptr, live);
     return live.soft_moved_m[0];
   };
   const auto pressed = shown();
   hybrid::Snapshot right;
+  // Points that a view asks for, within the object, move as the object says.
+  hybrid::AskedPoints asked{.number = 7, .at_rest_m = {{}}};
+  for (const glm::dvec3& v : drawn.objects[0].surface.vertices)
+    asked.at_rest_m[0].push_back(glm::mix(drawn.objects[0].inside.from_voxels({30.0, 30.0, 12.0}), v, 0.7));
+  hybrid::Snapshot near, merged;
+  hybrid::fill_moved_near(touch.world(), touch.state(), near);
+  hybrid::fill_asked(touch.world(), touch.state(), asked, true, near);
+  EXPECT_TRUE(near.asked.moved_m[0].empty()) << "the tick leaves them to the drawing thread";
+  hybrid::merge_live_surface(drawn, near, {}, &asked, merged);
+  hybrid::fill_asked(touch.world(), touch.state(), asked, false, right);
+  ASSERT_EQ(merged.asked.number, 7U);
+  ASSERT_EQ(merged.asked.moved_m[0].size(), right.asked.moved_m[0].size());
+  for (std::size_t p = 0; p < right.asked.moved_m[0].size(); ++p)
+    EXPECT_LT(glm::distance(merged.asked.moved_m[0][p], right.asked.moved_m[0][p]), 1e-4F);
   hybrid::fill_moved(touch.world(), touch.state(), right);
   ASSERT_EQ(pressed.size(), right.soft_moved_m[0].size());
   float deepest = 0.0F, tolerance = 0.0F;

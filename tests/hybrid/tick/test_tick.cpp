@@ -136,6 +136,30 @@ TEST_F(Tick, TheForceIsTheCouplingsWhateverIsTouched) {
   }
 }
 
+// The window's chart shows these parts.
+TEST_F(Tick, ThePartsSumUpToTheForce) {
+  Touch touch(
+      load("format = 1\n[tool]\nradius = 5\nstiffness = 1000\n[safety]\nmax_force = 2\npassivity = true\n"
+           "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [200, 200, 10]\n"
+           "position = [0, 0, -5]\nfriction = [0.5, 0.4]\ndamping = 3\n" +
+           std::string(tests::some_path)),
+      {0, 0, 0.01});
+  double friction = 0.0, damping = 0.0, limits = 0.0;
+  for (const dvec3& to :
+       {dvec3(0, 0, 0.004), dvec3(0.02, 0, 0.002), dvec3(0.02, 0.01, 0.0), dvec3(0, 0, 0.01)}) {
+    touch.go(to, 5e-5, 20, [&](const TickResult& felt) {
+      const dvec3 sum = felt.rigid_N + felt.soft_N + felt.limits_N + felt.passivity_N;
+      ASSERT_LE(glm::length(sum - felt.force_N), 1e-9);
+      friction = std::max(friction, glm::length(felt.friction_N));
+      damping = std::max(damping, glm::length(felt.damping_N));
+      limits = std::max(limits, glm::length(felt.limits_N));
+    });
+  }
+  EXPECT_GT(friction, 0.5);
+  EXPECT_GT(damping, 0.0);
+  EXPECT_GT(limits, 1.0);
+}
+
 TEST_F(Tick, AJumpIntoTissueEndsWhereASlowPressDoes) {
   for (const double depth_mm : {3.0, 8.0}) {
     const dvec3 end(0, 0, 5e-3 - 1e-3 * depth_mm);

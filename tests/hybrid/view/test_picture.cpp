@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "hybrid/view/camera.h"
+#include "hybrid/view/gl/unit_shapes.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
-#include "hybrid/view/unit_shapes.h"
 #include "polygon/surface/primitives.h"
 #include "tests/hybrid/view/picture_fixture.h"
 
@@ -129,8 +129,8 @@ TEST(DrawGeometry, DisplacementIsTheDistanceFromRest) {
   moved[3].x = std::numeric_limits<float>::quiet_NaN();
   EXPECT_NEAR(hybrid::move_vertices(draw, mesh.vertices, moved, {0.0, 0.0, 0.0}), 0.5F, 1e-6F);
   EXPECT_NEAR(glm::length(glm::dvec3(draw.vertices[10].position) - mesh.vertices[10]), 0.5, 1e-6);
-  EXPECT_EQ(draw.vertices[3].displacement_m, 0.0F);
-  EXPECT_NEAR(draw.vertices[10].displacement_m, 0.5F, 1e-6F);
+  EXPECT_EQ(draw.vertices[3].value, 0.0F);
+  EXPECT_NEAR(draw.vertices[10].value, 0.5F, 1e-6F);
 }
 
 TEST(LengthText, SaysWhatAPersonWould) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The cut through an object that hides a material: what a built scene stores of its inside, and when and
 // where it is cut.
-#include "hybrid/view/section.h"
+#include "hybrid/view/tissue/section.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,9 @@
 #include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/view/legend.h"
 #include "hybrid/view/palette.h"
+#include "hybrid/view/scene_meshes.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
+#include "tests/hybrid/view/cored_block.h"
 #include "tests/hybrid/view/picture_fixture.h"
 
 namespace {
@@ -30,19 +32,7 @@ Session cored() {
   Session s;
   s.scene.tool_radius_m = 3e-3;
   s.scene.objects.push_back({"block", true, tests::ball_mesh({0.0, 0.0, 0.0}, 0.017)});
-  hybrid::DrawnInside& inside = s.scene.objects[0].inside;
-  inside.dims = {20, 20, 20};
-  inside.origin_m = glm::dvec3(-9.5e-3);
-  inside.spacing_m = glm::dvec3(1e-3);
-  inside.materials = {"gel", "core"};
-  for (int k = 0; k < 20; ++k) {
-    for (int j = 0; j < 20; ++j) {
-      for (int i = 0; i < 20; ++i) {
-        const bool core = std::min({i, j, k}) >= 5 && std::max({i, j, k}) < 15;
-        inside.of_voxel.push_back(core ? 2 : 1);
-      }
-    }
-  }
+  s.scene.objects[0].inside = tests::cored_block();
   s.now.proxy_m = s.now.device_m = {0.0, 0.0, 0.015};
   s.now.force_N = {0.0, 0.0, 1.0};
   s.now.feel = {{true, 1.0}};
@@ -73,7 +63,7 @@ TEST(CutOf, LiesAlongTheForceAndFacesTheEye) {
   const Session s = cored();
   const auto cut = hybrid::choose_cut(s.scene, s.now, from_the_front(), 0);
   ASSERT_TRUE(cut.has_value());
-  EXPECT_NEAR(glm::length(cut->toward_eye - glm::dvec3(0.0, -1.0, 0.0)), 0.0, 1e-12);
+  EXPECT_NEAR(glm::length(cut->normal - glm::dvec3(0.0, -1.0, 0.0)), 0.0, 1e-12);
   EXPECT_EQ(cut->point_m, s.now.proxy_m);
 }
 
@@ -93,26 +83,50 @@ TEST(CutOf, IsOnlyThroughWhatIsPressedAndHidesSomething) {
   EXPECT_FALSE(hybrid::choose_cut(s.scene, s.now, camera, 0).has_value()) << "seen from its edge";
 }
 
-TEST(CutOf, ShowsAsMuchOfEachMaterialAsThereIs) {
+TEST(SectionOf, ShowsAsMuchOfEachMaterialAsThereIs) {
   const Session s = cored();
   const auto cut = hybrid::choose_cut(s.scene, s.now, from_the_front(), 0);
   ASSERT_TRUE(cut.has_value());
-  const auto section = hybrid::make_section(s.scene, s.now, 0, *cut, {0.0, 0.0, 0.0});
-  ASSERT_EQ(section.colours.size(), section.mesh.vertices.size());
+  const hybrid::Section section = hybrid::make_section(s.scene.objects[0], *cut);
   const auto colours = hybrid::palette::of_inside(s.scene, 0);
+  const hybrid::SectionImage image = hybrid::paint_materials(section, colours);
+  ASSERT_EQ(image.pixels.size(), section.materials.size());
+  const double pixel_m2 = glm::length(section.right_m) * glm::length(section.up_m);
   double core = 0.0, all = 0.0;
-  for (std::size_t n = 0; n < section.mesh.indices.size(); n += 3) {
-    const auto at = [&](std::size_t c) {
-      return section.mesh.vertices[section.mesh.indices[n + c]].position;
-    };
-    const double area = 0.5 * glm::length(glm::cross(at(1) - at(0), at(2) - at(0)));
-    const auto& colour = section.colours[section.mesh.indices[n]];
-    all += area;
-    if (std::abs(static_cast<float>(colour[0]) / 255.0F - colours[1].r) < 0.01F) core += area;
-    EXPECT_NEAR(at(0).y, 0.0F, 1e-6F);
+  for (const auto& pixel : image.pixels) {
+    if (pixel[3] == 0) continue;
+    all += pixel_m2;
+    if (std::abs(static_cast<float>(pixel[0]) / 255.0F - colours[1].r) < 0.01F) core += pixel_m2;
   }
   EXPECT_NEAR(all, 20e-3 * 20e-3, 0.03 * 4e-4);
   EXPECT_NEAR(core, 10e-3 * 10e-3, 0.06 * 1e-4);
+  // The net covers all tissue, and its nodes move with tissue.
+  double net = 0.0;
+  for (std::size_t n = 0; n < section.indices.size(); n += 3) {
+    const auto at = [&](std::size_t c) { return section.nodes_m[section.indices[n + c]]; };
+    net += 0.5 * glm::length(glm::cross(at(1) - at(0), at(2) - at(0)));
+    EXPECT_NEAR(at(0).y, 0.0, 1e-12);
+  }
+  EXPECT_GE(net, all);
+  EXPECT_LT(net, 1.3 * all);
+  for (const glm::dvec3& at : section.in_tissue)
+    EXPECT_TRUE(s.scene.objects[0].inside.material_at(at).has_value());
+}
+
+TEST(SectionOf, MovesWithTheTissue) {
+  const Session s = cored();
+  const hybrid::Section section =
+      hybrid::make_section(s.scene.objects[0], {{0.0, 2e-3, 0.0}, {0.0, 1.0, 0.0}});
+  const std::vector<glm::vec3> moved_m(section.nodes_m.size(), {1e-3F, 2e-3F, 3e-3F});
+  const glm::dvec3 origin_m(0.5, 0.0, 0.0);
+  const auto free = hybrid::move_section(section, moved_m, {}, false, origin_m);
+  const auto flat = hybrid::move_section(section, moved_m, {}, true, origin_m);
+  ASSERT_EQ(free.vertices.size(), section.nodes_m.size());
+  for (std::size_t n = 0; n < free.vertices.size(); ++n) {
+    const glm::vec3 rest(section.nodes_m[n] - origin_m);
+    EXPECT_NEAR(glm::distance(free.vertices[n].position, rest + moved_m[n]), 0.0F, 1e-6F);
+    EXPECT_NEAR(flat.vertices[n].position.y, 2e-3F, 1e-7F);
+  }
 }
 
 TEST_F(CutPicture, ShowsTheCoreInItsColour) {
@@ -134,7 +148,7 @@ TEST_F(CutPicture, ShowsTheCoreInItsColour) {
   EXPECT_TRUE(named);
 }
 
-TEST_F(InsideOf, IsKeptOnlyIfTheSurfaceHidesAMaterial) {
+TEST_F(InsideOf, NamesAllMaterialsAndWhetherTheSurfaceHidesOne) {
   const std::string materials =
       "format = 1\nunits = \"mm\"\n[material.gel]\nyoung = 9000\n[material.hard]\nyoung = 90000\n" +
       tests::block + "material = \"gel\"\nmaterials = { \"2\" = \"hard\" }\n";
@@ -148,8 +162,10 @@ TEST_F(InsideOf, IsKeptOnlyIfTheSurfaceHidesAMaterial) {
   ASSERT_EQ(hidden.inside.materials, (std::vector<std::string>{"gel", "hard"}));
   EXPECT_EQ(hidden.inside.material_at({0.0, 0.0, 0.0}), 1U);
   EXPECT_EQ(hidden.inside.material_at({9e-3, 0.0, 0.0}), 0U);
-  EXPECT_TRUE(drawn("inclusions = [{ shape = \"box\", centre = [0, 0, 5], size = [10, 10, 6], label = 2 }]\n")
-                  .inside.of_voxel.empty());
+  EXPECT_TRUE(hidden.hides_material());
+  EXPECT_FALSE(
+      drawn("inclusions = [{ shape = \"box\", centre = [0, 0, 5], size = [10, 10, 6], label = 2 }]\n")
+          .hides_material());
 }
 
 }  // namespace

@@ -54,6 +54,25 @@ TEST(TickHistory, ASpikeOfTwoTicksIsInTheColumnsAtAnyFrameRate) {
   }
 }
 
+TEST(TickHistory, EveryPartHasItsSeries) {
+  hybrid::TickHistory history(5.0);
+  hybrid::TickSample one{.t_s = 1.0,
+                         .total_N = 1.0F,
+                         .rigid_N = 2.0F,
+                         .soft_N = 3.0F,
+                         .friction_N = 4.0F,
+                         .damping_N = 5.0F,
+                         .limits_N = 6.0F,
+                         .passivity_N = 7.0F};
+  history.add(one);
+  for (std::size_t s = 0; s < hybrid::kForceSeries; ++s) {
+    const auto series = static_cast<ForceSeries>(s);
+    EXPECT_EQ(history.most_N(series), static_cast<double>(s + 1));
+    EXPECT_EQ(most_in(history, series, 10), static_cast<float>(s + 1));
+  }
+  EXPECT_EQ(history.most_N(), 7.0);
+}
+
 TEST(TickHistory, AFullRingRefusesAndCountsAndDoesNotWait) {
   hybrid::TickSamples ring(100);
   for (int tick = 0; tick < 250; ++tick) ring.push(sample(tick, 1.0F));

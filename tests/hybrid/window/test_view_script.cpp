@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
 #include <stdexcept>
 
 #include "hybrid/window/window_keys.h"
@@ -87,6 +88,52 @@ TEST(ViewScript, RefusesWithTheLineAndWhatWouldDo) {
     EXPECT_EQ(refusal_of_script(text).substr(0, words.size()), words);
   }
   EXPECT_EQ(refusal_of_script(""), "");
+}
+
+TEST(ViewScript, MovesSlicesAndChoosesColours) {
+  ViewScript script("0 slice y 0.4\n1 slice x 1\n2 slice y off\n3 grey on\n3 colour limits\n4 slice off",
+                    "tour.txt", drawn());
+  hybrid::ViewState state;
+  const auto play_to = [&](double t_s) {
+    for (const auto& action : script.due(t_s)) hybrid::act(state, action);
+  };
+  play_to(0.0);
+  EXPECT_EQ(state.view.slices[1], (hybrid::SlicePlane{true, 0.4}));
+  play_to(2.0);
+  EXPECT_EQ(state.view.slices[0], (hybrid::SlicePlane{true, 1.0}));
+  EXPECT_EQ(state.view.slices[1], (hybrid::SlicePlane{false, 0.4})) << "a slice keeps its place";
+  EXPECT_FALSE(state.view.slices[2].on);
+  play_to(3.0);
+  EXPECT_TRUE(state.view.grey);
+  EXPECT_EQ(state.view.colour, hybrid::TissueColour::limits);
+  play_to(4.0);
+  EXPECT_FALSE(state.view.sliced());
+  EXPECT_NE(refusal_of_script("0 slice w 0.4").find("tour.txt:1: 'w' is no axis"), std::string::npos);
+  EXPECT_NE(refusal_of_script("0 slice x 1.5").find("slice y 0.4"), std::string::npos);
+  EXPECT_NE(refusal_of_script("0 slice x").find("slice y 0.4"), std::string::npos);
+  EXPECT_NE(refusal_of_script("0 slice off 1"), "");
+  EXPECT_NE(refusal_of_script("0 colour red").find("colour strain"), std::string::npos);
+}
+
+TEST(WindowKeys, SwitchSlicesAndColours) {
+  hybrid::ViewState state;
+  const auto press = [&](std::string_view key) {
+    hybrid::act(state, *hybrid::action_of_key(key, false, state));
+  };
+  state.view.slices[1].share = 0.3;
+  press("v");
+  EXPECT_TRUE(state.view.slices[0].on && state.view.slices[1].on && state.view.slices[2].on);
+  EXPECT_EQ(state.view.slices[1].share, 0.3);
+  press("v");
+  EXPECT_FALSE(state.view.sliced());
+  const hybrid::TissueColour first = state.view.colour;
+  std::set<hybrid::TissueColour> seen;
+  for (std::size_t n = 0; n < hybrid::kTissueColours.size(); ++n) {
+    seen.insert(state.view.colour);
+    press("m");
+  }
+  EXPECT_EQ(seen.size(), hybrid::kTissueColours.size());
+  EXPECT_EQ(state.view.colour, first);
 }
 
 TEST(WindowKeys, DoWhatTheButtonsDo) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/view/gl_objects.h"
+#include "hybrid/view/gl/gl_objects.h"
 
 #include <epoxy/gl.h>
 
@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "hybrid/view/renderer_shaders.h"
+#include "hybrid/view/gl/renderer_shaders.h"
 
 namespace hybrid {
 namespace {
@@ -71,6 +71,12 @@ void set_uniform(GLuint program, const char* name, float value) {
 void set_uniform(GLuint program, const char* name, int value) {
   glUniform1i(glGetUniformLocation(program, name), value);
 }
+void set_uniform(GLuint program, const char* name, const glm::ivec2& value) {
+  glUniform2i(glGetUniformLocation(program, name), value.x, value.y);
+}
+void set_uniform(GLuint program, const char* name, const glm::vec2& value) {
+  glUniform2fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
+}
 void set_uniform(GLuint program, const char* name, const glm::vec3& value) {
   glUniform3fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
 }
@@ -110,7 +116,33 @@ const void* buffer_offset(std::size_t bytes) {
   return reinterpret_cast<const void*>(bytes);  // OpenGL takes an offset as a pointer
 }
 
-void GlMesh::upload(const DrawMesh& mesh, GLenum usage) {
+GLuint make_image(int width, int height, std::span<const VertexColour> pixels) {
+  GLuint image = 0;
+  glGenTextures(1, &image);
+  replace_image(image, width, height, pixels);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  return image;
+}
+
+void replace_image(GLuint image, int width, int height, std::span<const VertexColour> pixels) {
+  bind_image(image);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
+}
+
+void delete_image(GLuint image) {
+  if (image != 0) glDeleteTextures(1, &image);
+}
+
+void bind_image(GLuint image) {
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, image);
+}
+
+void GlMesh::upload(const DrawMesh& mesh, bool moves) {
   if (mesh.indices.size() > static_cast<std::size_t>(std::numeric_limits<GLsizei>::max())) {
     throw std::runtime_error("a surface of " + std::to_string(mesh.indices.size() / 3) +
                              " triangles is more than one draw call holds; simplify the mesh");
@@ -121,15 +153,14 @@ void GlMesh::upload(const DrawMesh& mesh, GLenum usage) {
   glBindVertexArray(array);
   glBindBuffer(GL_ARRAY_BUFFER, vertices);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex)),
-               mesh.vertices.data(), usage);
+               mesh.vertices.data(), moves ? GL_STREAM_DRAW : GL_STATIC_DRAW);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices);
   glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.indices.size() * sizeof(std::uint32_t)),
                mesh.indices.data(), GL_STATIC_DRAW);
   constexpr auto stride = static_cast<GLsizei>(sizeof(DrawVertex));
   glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(DrawVertex, position)));
   glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(DrawVertex, normal)));
-  glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, stride,
-                        buffer_offset(offsetof(DrawVertex, displacement_m)));
+  glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, stride, buffer_offset(offsetof(DrawVertex, value)));
   for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
   count = static_cast<GLsizei>(mesh.indices.size());
 }
@@ -144,6 +175,16 @@ void GlMesh::upload_colours(const std::vector<VertexColour>& of_vertex) {
   glEnableVertexAttribArray(3);
 }
 
+void GlMesh::upload_places(std::span<const glm::vec2> of_vertex) {
+  glGenBuffers(1, &places);
+  glBindVertexArray(array);
+  glBindBuffer(GL_ARRAY_BUFFER, places);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(of_vertex.size_bytes()), of_vertex.data(),
+               GL_STATIC_DRAW);
+  glVertexAttribPointer(4, 2, GL_FLOAT, GL_FALSE, 0, buffer_offset(0));
+  glEnableVertexAttribArray(4);
+}
+
 void GlMesh::stream(const DrawMesh& mesh) const {
   const auto bytes = static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(DrawVertex));
   glBindBuffer(GL_ARRAY_BUFFER, vertices);
@@ -156,9 +197,9 @@ void GlMesh::draw() const {
   glDrawElements(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr);
 }
 
-void GlMesh::draw_seen(const glm::mat4& clip_from_mesh, float margin) const {
+void GlMesh::draw_seen(const glm::mat4& clip_from_mesh, float margin, const ValueRange& values) const {
   glBindVertexArray(array);
-  for (const IndexRange& range : seen_ranges(parts, clip_from_mesh, margin)) {
+  for (const IndexRange& range : seen_ranges(parts, clip_from_mesh, margin, values)) {
     glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(range.count), GL_UNSIGNED_INT,
                    buffer_offset(range.first * sizeof(std::uint32_t)));
   }
@@ -166,7 +207,7 @@ void GlMesh::draw_seen(const glm::mat4& clip_from_mesh, float margin) const {
 
 void GlMesh::release() {
   glDeleteVertexArrays(1, &array);
-  for (const GLuint* buffer : {&vertices, &indices, &colours}) {
+  for (const GLuint* buffer : {&vertices, &indices, &colours, &places}) {
     if (*buffer != 0) glDeleteBuffers(1, buffer);
   }
   *this = {};
@@ -195,6 +236,39 @@ void attach_targets(GLuint frame, GLuint colour, GLuint depth) {
   }
 }
 
+bool GlLayer::set_size(int to_width, int to_height) {
+  if (frame != 0 && width == to_width && height == to_height) return false;
+  release();
+  width = to_width, height = to_height;
+  glGenFramebuffers(1, &frame);
+  colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
+  depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, width, height);
+  attach_targets(frame, colour, depth);
+  return true;
+}
+
+void GlLayer::release() {
+  if (frame == 0) return;
+  const std::array textures{colour, depth};
+  glDeleteTextures(textures.size(), textures.data());
+  glDeleteFramebuffers(1, &frame);
+  *this = {};
+}
+
+void GlCover::create() {
+  glGenVertexArrays(1, &array);
+}
+
+void GlCover::draw() const {
+  glBindVertexArray(array);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void GlCover::release() {
+  glDeleteVertexArrays(1, &array);
+  array = 0;
+}
+
 void RenderTargets::create() {
   glGenFramebuffers(1, &scene_frame);
   glGenFramebuffers(1, &shown_frame);
@@ -208,7 +282,7 @@ void RenderTargets::release() {
   glDeleteFramebuffers(frames.size(), frames.data());
 }
 
-int RenderTargets::set_size(int width, int height, int wanted) {
+void RenderTargets::set_size(int width, int height, int wanted) {
   if (width < 1 || height < 1 || width > kMostPixelsOfPicture || height > kMostPixelsOfPicture) {
     throw std::runtime_error("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
                              " pixels cannot be drawn; each side must be from 1 to " +
@@ -220,7 +294,8 @@ int RenderTargets::set_size(int width, int height, int wanted) {
   while (factor > 1 && std::max(width, height) * factor > std::min(most, kMostPixelsOfPicture)) --factor;
   const int w = width * factor;
   const int h = height * factor;
-  if (w == built_width && h == built_height) return factor;
+  samples = factor;
+  if (w == built_width && h == built_height) return;
   const std::array old{scene_colour, scene_depth, shown_depth, final_colour};
   glDeleteTextures(old.size(), old.data());
   scene_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, w, h);
@@ -232,7 +307,28 @@ int RenderTargets::set_size(int width, int height, int wanted) {
   attach_targets(final_frame, final_colour, 0);
   built_width = w;
   built_height = h;
-  return factor;
+}
+
+void show_frame(GLuint frame, int width, int height, int to_width, int to_height) {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, frame);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+  glBlitFramebuffer(0, 0, width, height, 0, 0, to_width, to_height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  check_gl("showing a frame");
+}
+
+std::vector<std::uint8_t> read_frame(GLuint frame, int width, int height) {
+  const auto row = static_cast<std::size_t>(width) * 3;
+  std::vector<std::uint8_t> up(row * static_cast<std::size_t>(height));
+  std::vector<std::uint8_t> down(up.size());
+  glBindFramebuffer(GL_FRAMEBUFFER, frame);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, up.data());
+  check_gl("reading a frame");
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+    std::copy_n(up.end() - static_cast<std::ptrdiff_t>((y + 1) * row), row,
+                down.begin() + static_cast<std::ptrdiff_t>(y * row));
+  }
+  return down;
 }
 
 void GlOverlay::create() {

@@ -34,6 +34,10 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in float displacement;
 layout(location = 3) in vec3 vertex_colour;
+#ifdef SLICE
+layout(location = 4) in vec2 place_of_vertex;
+out vec2 image_place;
+#endif
 uniform mat4 scene_from_mesh;   // scene: relative to the renderer's origin
 uniform mat3 normal_from_mesh;
 uniform mat4 clip_from_scene;
@@ -61,6 +65,9 @@ void main() {
 #else
   scene_normal = n;
 #endif
+#ifdef SLICE
+  image_place = place_of_vertex;
+#endif
   moved = displacement;
   material_colour = vertex_colour;
   gl_ClipDistance[0] = dot(kept, at);
@@ -69,10 +76,10 @@ void main() {
 }
 )";
 
-// The common part of the fragment shaders. One of the constants of shading.cpp is defined before it.
-inline constexpr const char* fragment_head = R"(
+// The fragment shaders. One of the sets of constants of shading.cpp is defined before them.
+inline constexpr const char* mesh_fragment = R"(
 in vec3 scene_position;
-#if defined(HIDING_DEPTH) || defined(UNHIDING)
+#ifdef UNHIDING
 uniform sampler2D shown_depth;  // depth of what must not be hidden
 uniform mat4 clip_from_scene;
 uniform float apart;  // least length by which a surface in front hides another (scene)
@@ -84,9 +91,10 @@ bool hides() {
   return kept < 1.0 && 0.5 + 0.5 * at.z / at.w < kept;
 }
 #endif
-)";
-
-inline constexpr const char* mesh_fragment = R"(
+#ifdef SLICE
+in vec2 image_place;
+uniform sampler2D slice_image;  // alpha below 1/2: no tissue
+#endif
 #ifdef LIT_BY_VERTEX
 in vec3 light;
 #else
@@ -101,7 +109,8 @@ uniform float alpha;
 uniform vec3 moved_ramp[9];      // colours of the scale, from 0 to its end
 uniform float own_until;         // shares of the scale over which the own colour gives way to the ramp
 uniform float ramp_from;
-uniform float moved_scale;  // 0: the object does not move
+uniform float ramp_share;        // most share of the ramp in the colour
+uniform float moved_scale;       // value at the end of the scale; 0: only the own colour
 // Piecewise linear between the colours of the ramp. An index that differs from pixel to pixel costs more.
 vec3 ramp_at(float share) {
   vec3 colour = moved_ramp[0];
@@ -130,17 +139,23 @@ void main() {
 
 #if defined(GLASS)
   float a = mix(0.12, 0.95, pow(1.0 - facing, 1.6));
-#elif defined(HIDING)
+#elif defined(LAYER)
   float a = mix(0.17, 0.80, pow(1.0 - facing, 1.7));
 #else
   float a = alpha;
 #endif
 
+#ifdef SLICE
+  vec4 pixel = texture(slice_image, image_place);
+  if (pixel.a < 0.5) discard;
+  vec3 base = pixel.rgb / pixel.a;  // pixels without tissue are black and transparent
+#else
   vec3 base = coloured_vertices ? material_colour : own_colour;
+#endif
 #ifdef TISSUE
   if (moved_scale > 0.0) {
     float t = clamp(moved / moved_scale, 0.0, 1.0);
-    base = mix(base, ramp_at(t), smoothstep(own_until, ramp_from, t));
+    base = mix(base, ramp_at(t), ramp_share * smoothstep(own_until, ramp_from, t));
     // A thin darker line every tenth of the scale: contours show shape where colour alone does not.
     float line = t * 10.0;
     float width = max(fwidth(line), 1e-4);
@@ -148,17 +163,43 @@ void main() {
     if (t > 0.05) base *= 1.0 - 0.22 * (1.0 - smoothstep(0.4, 1.4, away)) * clamp(0.5 / width, 0.0, 1.0);
   }
 #endif
+#ifdef SLICE
+  // Hardly any light, so that grey values stay comparable; enough to tell the planes apart.
+  colour = vec4(base * mix(0.82, 1.0, facing), 1.0);
+#else
   if (inside) base *= vec3(0.90, 0.87, 0.84);
   colour = vec4(base * light.x + vec3(light.y), a);
+#endif
 }
 )";
 
 // Depth only, without lighting.
 inline constexpr const char* depth_fragment = R"(
+void main() {}
+)";
+
+// Copies the layer of rigid objects, which covers the viewport.
+inline constexpr const char* cover_vertex = R"(
 void main() {
-#ifdef HIDING_DEPTH
-  if (!hides()) discard;
-#endif
+  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}
+)";
+inline constexpr const char* layer_fragment = R"(
+uniform sampler2D layer_colour, layer_depth, shown_depth;
+uniform ivec2 corner;      // of the viewport in the frame
+// a and b: the depth of a surface that moves away by twice `apart` rises by b * (depth + a)^2.
+uniform vec2 further;
+out vec4 colour;
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  float depth = texelFetch(layer_depth, pixel - corner, 0).r;
+  if (depth >= 1.0) discard;
+  float kept = texelFetch(shown_depth, pixel, 0).r;
+  float from_end = depth + further.x;
+  bool hides = kept < 1.0 && depth + further.y * from_end * from_end < kept;
+  vec4 own = texelFetch(layer_colour, pixel - corner, 0);
+  colour = vec4(own.rgb, hides ? own.a : 1.0);
+  gl_FragDepth = depth;
 }
 )";
 

@@ -7,14 +7,15 @@
 #include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <span>
 #include <vector>
 
-#include "hybrid/view/layout.h"
-#include "hybrid/view/mesh_parts.h"
-#include "hybrid/view/unit_shapes.h"
+#include "hybrid/view/gl/mesh_parts.h"
+#include "hybrid/view/gl/pixel_rect.h"
+#include "hybrid/view/gl/unit_shapes.h"
 
 namespace hybrid {
 
@@ -33,11 +34,19 @@ void check_gl(const char* doing);
 // Sets a uniform of the program in use.
 void set_uniform(GlName program, const char* name, float value);
 void set_uniform(GlName program, const char* name, int value);
+void set_uniform(GlName program, const char* name, const glm::ivec2& value);
+void set_uniform(GlName program, const char* name, const glm::vec2& value);
 void set_uniform(GlName program, const char* name, const glm::vec3& value);
 void set_uniform(GlName program, const char* name, const glm::vec4& value);
 void set_uniform(GlName program, const char* name, const glm::mat3& value);
 void set_uniform(GlName program, const char* name, const glm::mat4& value);
 void set_uniform(GlName program, const char* name, std::span<const glm::vec3> values);
+
+// A texture with an image, filtered between pixels. 0 is no image.
+GlName make_image(int width, int height, std::span<const VertexColour> pixels);
+void replace_image(GlName image, int width, int height, std::span<const VertexColour> pixels);
+void delete_image(GlName image);
+void bind_image(GlName image);  // to the first unit
 
 // Compiles and links a program. Throws std::runtime_error with the driver's log.
 GlName link_program(const char* vertex, const char* fragment);
@@ -48,19 +57,22 @@ const void* buffer_offset(std::size_t bytes);
 
 // A mesh in the card's memory.
 struct GlMesh {
-  GlName array = 0, vertices = 0, indices = 0, colours = 0;
+  GlName array = 0, vertices = 0, indices = 0, colours = 0, places = 0;
   int count = 0;
   std::vector<MeshPart> parts{};  // of the indices, for draw_seen()
 
   // Throws std::runtime_error when the mesh has too many triangles for one draw call.
-  void upload(const DrawMesh& mesh, GlEnum usage);
+  // `moves`: stream() will be called often.
+  void upload(const DrawMesh& mesh, bool moves = false);
   // One sRGB colour per vertex; called at most once.
   void upload_colours(const std::vector<VertexColour>& of_vertex);
+  // The place of each vertex in an image, from 0 to 1; called at most once.
+  void upload_places(std::span<const glm::vec2> of_vertex);
   // Replaces the vertices. Orphans the old storage, so that the driver need not wait for the previous frame.
   void stream(const DrawMesh& mesh) const;
   void draw() const;
-  // Draws the parts that may be in the view. `margin`: as of seen_ranges().
-  void draw_seen(const glm::mat4& clip_from_mesh, float margin) const;
+  // Draws the parts that may be in the view of `clip_from_mesh`. `margin`, `values`: as of seen_ranges().
+  void draw_seen(const glm::mat4& clip_from_mesh, float margin, const ValueRange& values = {}) const;
   // Deletes the buffers. The mesh is empty afterwards.
   void release();
 };
@@ -71,20 +83,47 @@ GlName make_texture_target(GlEnum inner, GlEnum outer, GlEnum type, int width, i
 // Attaches textures to a framebuffer (0: none) and binds it. Throws std::runtime_error if the driver refuses.
 void attach_targets(GlName frame, GlName colour, GlName depth);
 
+// Textures of colour and depth into which something is drawn once and used in many frames.
+struct GlLayer {
+  GlName frame = 0, colour = 0, depth = 0;
+  int width = 0, height = 0;  // pixels
+
+  // Builds the textures anew if the size differs. Returns true if it did.
+  bool set_size(int to_width, int to_height);
+  void release();
+};
+
+// A triangle that covers the viewport, for programs without vertices.
+struct GlCover {
+  GlName array = 0;
+
+  void create();
+  void draw() const;
+  void release();
+};
+
 // The textures into which a frame is drawn, and their framebuffers.
 struct RenderTargets {
   GlName scene_frame = 0, scene_colour = 0, scene_depth = 0;
   GlName shown_frame = 0, shown_depth = 0;  // depth of what must not be hidden
   GlName final_frame = 0, final_colour = 0;
   int built_width = 0, built_height = 0;  // of the scene's textures (pixels)
+  int samples = 1;                        // per pixel along each axis
+  // Holds the frame in pixels when it is complete. With one sample per pixel the scene is the frame.
+  [[nodiscard]] GlName frame() const { return samples == 1 ? scene_frame : final_frame; }
 
   void create();
   void release();
-  // Builds the textures anew if the size (pixels) has changed. Returns the samples per pixel along each axis:
-  // `wanted`, or fewer if the driver's textures would be too small. Throws std::runtime_error if a side is
-  // not from 1 to 8192 pixels.
-  int set_size(int width, int height, int wanted);
+  // Builds the textures anew if the size (pixels) has changed. `samples` becomes `wanted`, or less if the
+  // driver's textures would be too small. Throws std::runtime_error if a side is not from 1 to 8192 pixels.
+  void set_size(int width, int height, int wanted);
 };
+
+// Copies a framebuffer to the context's default one, whose size is to_width × to_height.
+void show_frame(GlName frame, int width, int height, int to_width, int to_height);
+
+// The pixels of a framebuffer: rows from the top, three bytes (RGB) a pixel.
+std::vector<std::uint8_t> read_frame(GlName frame, int width, int height);
 
 // A vertex of the overlay: position in pixels (y down), texture coordinates in the font atlas, colour
 // 0xAABBGGRR.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/view/unit_shapes.h"
+#include "hybrid/view/gl/unit_shapes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,6 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "hybrid/view/palette.h"
 #include "polygon/mesh/is_finite.h"
 #include "polygon/mesh/mesh.h"
 
@@ -150,19 +149,10 @@ DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& o
   return shared_mesh(mesh, origin_m);
 }
 
-std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index) {
-  const DrawnObject& object = scene.objects[index];
-  if (object.materials.empty()) return {};
-  std::vector<VertexColour> of_material, of_vertex;
-  for (const glm::vec3& c : palette::of_materials(scene, index)) {
-    const glm::vec3 byte = glm::round(255.0F * c);
-    of_material.push_back({static_cast<std::uint8_t>(byte.r), static_cast<std::uint8_t>(byte.g),
-                           static_cast<std::uint8_t>(byte.b), 255});
-  }
-  of_vertex.reserve(object.vertex_material.size());
-  for (const std::uint8_t m : object.vertex_material)
-    of_vertex.push_back(of_material[std::min<std::size_t>(m, of_material.size() - 1)]);
-  return of_vertex;
+VertexColour bytes_of(const glm::vec3& colour) {
+  const glm::vec3 byte = glm::round(255.0F * colour);
+  return {static_cast<std::uint8_t>(byte.r), static_cast<std::uint8_t>(byte.g),
+          static_cast<std::uint8_t>(byte.b), 255};
 }
 
 float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> moved_m,
@@ -174,8 +164,8 @@ float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<
     if (!polygon::is_finite(rest[v])) continue;
     const bool known = polygon::is_finite(moved);
     vertex.position = glm::vec3(rest[v] - origin_m + (known ? moved : glm::dvec3(0.0)));
-    vertex.displacement_m = known ? static_cast<float>(glm::length(moved)) : 0.0F;
-    most = std::max(most, vertex.displacement_m);
+    vertex.value = known ? static_cast<float>(glm::length(moved)) : 0.0F;
+    most = std::max(most, vertex.value);
   }
   set_shared_normals(draw);
   return most;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/view/mesh_parts.h"
+#include "hybrid/view/gl/mesh_parts.h"
 
 #include <algorithm>
 #include <glm/common.hpp>
@@ -59,13 +59,15 @@ void sort_triangles(DrawMesh& mesh) {
 
 MeshPart part_of(const DrawMesh& mesh, std::size_t first, std::size_t count) {
   glm::vec3 low(std::numeric_limits<float>::max()), high(-low);
+  float most_value = 0.0F;
   for (std::size_t n = first; n < first + count; ++n) {
     const glm::vec3& at = mesh.vertices[mesh.indices[n]].position;
     low = glm::min(low, at);
     high = glm::max(high, at);
+    most_value = std::max(most_value, mesh.vertices[mesh.indices[n]].value);
   }
   return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count), 0.5F * (low + high),
-          0.5F * glm::length(high - low)};
+          0.5F * glm::length(high - low), most_value};
 }
 
 }  // namespace
@@ -76,6 +78,10 @@ std::vector<MeshPart> divide_mesh(DrawMesh& mesh) {
   for (std::size_t first = 0; first < mesh.indices.size(); first += 3 * kPartTriangles)
     parts.push_back(part_of(mesh, first, std::min(3 * kPartTriangles, mesh.indices.size() - first)));
   return parts;
+}
+
+void update_parts(const DrawMesh& mesh, std::span<MeshPart> parts) {
+  for (MeshPart& part : parts) part = part_of(mesh, part.first, part.count);
 }
 
 // After Gribb & Hartmann 2001: a clip coordinate is within the view if it lies between -w and w.
@@ -92,14 +98,14 @@ std::array<glm::vec4, 6> planes_of_view(const glm::mat4& clip_from_mesh) {
 }
 
 std::vector<IndexRange> seen_ranges(std::span<const MeshPart> parts, const glm::mat4& clip_from_mesh,
-                                    float margin) {
+                                    float margin, const ValueRange& values) {
   const std::array<glm::vec4, 6> planes = planes_of_view(clip_from_mesh);
   std::vector<IndexRange> ranges;
   for (const MeshPart& part : parts) {
     const bool outside = std::ranges::any_of(planes, [&](const glm::vec4& plane) {
       return glm::dot(glm::vec3(plane), part.centre) + plane.w < -(part.radius + margin);
     });
-    if (outside) continue;
+    if (outside || !(part.most_value > values.above && part.most_value <= values.up_to)) continue;
     if (!ranges.empty() && ranges.back().first + ranges.back().count == part.first) {
       ranges.back().count += part.count;
     } else {

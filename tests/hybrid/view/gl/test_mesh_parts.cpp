@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/view/mesh_parts.h"
+#include "hybrid/view/gl/mesh_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -10,15 +10,14 @@
 #include <span>
 #include <vector>
 
-#include "hybrid/snapshot/snapshot.h"
 #include "polygon/mesh/mesh.h"
 
 namespace hybrid {
 
 struct DrawVertex {
-  glm::vec3 position{0.0F};     // relative to the mesh's origin (unit: meter)
-  glm::vec3 normal{0.0F};       // unit vector; zero if undefined (degenerate or inconsistently oriented)
-  float displacement_m = 0.0F;  // from rest; 0 for a rigid object
+  glm::vec3 position{0.0F};  // relative to the mesh's origin (unit: meter)
+  glm::vec3 normal{0.0F};    // unit vector; zero if undefined (degenerate or inconsistently oriented)
+  float value = 0.0F;        // the quantity that colours tissue; 0 for a rigid object
 };
 static_assert(sizeof(DrawVertex) == 28, "uploaded as it stands");
 
@@ -36,14 +35,12 @@ DrawMesh make_draw_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& ori
 // needs.
 DrawMesh make_moving_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origin_m);
 
-// Colours (sRGB) of the materials at an object's vertices, in the mesh's order; empty if the object has one
-// colour.
-using VertexColour = std::array<std::uint8_t, 4>;
-std::vector<VertexColour> colours_of_vertices(const DrawnScene& scene, std::size_t index);
+using VertexColour = std::array<std::uint8_t, 4>;  // sRGB and alpha
+VertexColour bytes_of(const glm::vec3& colour);    // opaque; each part from 0 to 1
 
-// Moves the vertices of a moving mesh by `moved_m` (meters) from rest, and updates normals and displacements.
-// Vertices whose displacement is not finite stay at rest. Returns the largest displacement (m). `moved_m`
-// must have as many entries as `rest`.
+// Moves the vertices of a moving mesh by `moved_m` (meters) from rest, and updates normals. Values become
+// displacements. Vertices whose displacement is not finite stay at rest. Returns the largest displacement
+// (m). `moved_m` must have as many entries as `rest`.
 float move_vertices(DrawMesh& draw, std::span<const glm::dvec3> rest, std::span<const glm::vec3> moved_m,
                     const glm::dvec3& origin_m);
 

@@ -8,10 +8,11 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
-#include "hybrid/view/unit_shapes.h"
+#include "hybrid/view/gl/unit_shapes.h"
 #include "polygon/mesh/mesh.h"
 
 namespace hybrid {
@@ -21,6 +22,11 @@ struct MeshPart {
   std::uint32_t first = 0, count = 0;
   glm::vec3 centre{0.0F};
   float radius = 0.0F;
+  float most_value = 0.0F;  // largest DrawVertex::value
+};
+// Parts whose largest value is above `above` and at most `up_to`.
+struct ValueRange {
+  float above = -1.0F, up_to = std::numeric_limits<float>::infinity();
 };
 struct IndexRange {
   std::uint32_t first = 0, count = 0;
@@ -34,10 +40,13 @@ std::vector<MeshPart> divide_mesh(DrawMesh& mesh);
 // have unit length.
 std::array<glm::vec4, 6> planes_of_view(const glm::mat4& clip_from_mesh);
 
-// The indices of all parts that may be in the view. Touching ranges are joined. `margin`: most distance of a
-// vertex from its place in the part (mesh's frame).
+// Call after vertices of the mesh have moved or have other values.
+void update_parts(const DrawMesh& mesh, std::span<MeshPart> parts);
+
+// The indices of all parts that may be in the view and whose values are in a range. Touching ranges are
+// joined. `margin`: most distance of a vertex from its place in the part (mesh's frame).
 std::vector<IndexRange> seen_ranges(std::span<const MeshPart> parts, const glm::mat4& clip_from_mesh,
-                                    float margin);
+                                    float margin, const ValueRange& values = {});
 
 // Is every edge shared by exactly two triangles that agree on their side, and is the volume positive? Then
 // the back of no triangle is seen from outside.

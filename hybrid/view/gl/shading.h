@@ -6,20 +6,22 @@
 #include <array>
 #include <cstdint>
 
-#include "hybrid/view/gl_objects.h"
+#include "hybrid/view/gl/gl_objects.h"
 
 namespace hybrid {
 
 enum class Shading : std::uint8_t {
-  plain,        // lit; opaque, or with one alpha
-  tissue,       // the same, with the colour scale of displacement
-  unhiding,     // rigid, only in pixels where it hides no soft object and no tool
-  hiding,       // rigid, where its depth was drawn before: dense at the rim, thin where it faces the eye
-  glass,        // like glass
-  depth,        // depth only
-  hiding_depth  // depth only, rigid, only in the pixels that `unhiding` leaves out
+  plain,     // lit; opaque, or with one alpha
+  tissue,    // the same, with a colour scale
+  slice,     // the same, with an image in place of lighting
+  layer,     // rigid, as `plain`; alpha is dense at the rim and thin where the surface faces the eye
+  unhiding,  // rigid, only in pixels where it hides no soft object and no tool
+  glass,     // like glass
+  depth,     // depth only
+  // Copies the layer of rigid objects: opaque where it hides no soft object and no tool, else thin.
+  cover
 };
-inline constexpr std::size_t kShadings = 7;
+inline constexpr std::size_t kShadings = 8;
 
 class ShadingPrograms {
  public:

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The layer of rigid objects: the nearest rigid surface at each pixel of a view. It is drawn again only if
+// the view or a rigid object has moved. What must not be hidden lies before or behind it, pixel by pixel.
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "hybrid/view/gl/gl_objects.h"
+
+namespace hybrid {
+
+// All that the layer depends on.
+struct LayerKey {
+  glm::mat4 clip{0.0F};                                    // clip_from_scene
+  glm::vec4 clip_plane{0.0F};                              // the view's
+  std::vector<std::pair<std::size_t, glm::mat4>> drawn{};  // objects and their places
+
+  friend bool operator==(const LayerKey&, const LayerKey&) = default;
+};
+struct RigidLayer {
+  GlLayer layer;
+  LayerKey key;
+};
+
+// The least value of a series with constant ratio from `least` on that is not below `radius`. So the range of
+// depths takes few values, and a moving tool seldom changes the depths of all else.
+[[nodiscard]] double rounded_up(double radius, double least);
+
+// a and b of `change = b (depth + a)²`: how much greater the depth (0 to 1) of a point becomes that moves
+// away from the eye by a small length. The matrix is that of a perspective projection and a rigid transform.
+[[nodiscard]] glm::vec2 depth_further(const glm::dmat4& clip_from_scene, double by_m);
+
+// The part of a view that contains a unit disc; empty: the disc is not in the view. `pixels`: of the view, y
+// up.
+struct ViewPart {
+  PixelRect pixels;
+  glm::mat4 whole_from_clip{1.0F};  // maps the part to the whole view
+};
+[[nodiscard]] std::optional<ViewPart> part_with_disc(const glm::mat4& clip, const glm::mat4& placed_disc,
+                                                     const PixelRect& pixels);
+
+}  // namespace hybrid

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The objects of a scene in the graphics card's memory. What has not changed since the last frame is not
+// uploaded again. Every call needs the renderer's context to be current.
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec4.hpp>
+#include <vector>
+
+#include "hybrid/snapshot/snapshot.h"
+#include "hybrid/view/gl/gl_objects.h"
+#include "hybrid/view/tissue_view.h"
+
+namespace hybrid {
+
+inline constexpr glm::vec4 kKeepAll{0.0F, 0.0F, 0.0F, 1.0F};  // a plane that clips nothing
+
+// A picture cuts an object in which one material hides another: the part towards the eye is left out, and the
+// face of the cut shows the materials.
+// The cut is a plane through the tool along the force, with its normal towards the eye. Only if
+// the tool presses the object, the object hides a material, and the snapshot has the displacements within it.
+[[nodiscard]] std::optional<SectionPlane> choose_cut(const DrawnScene& scene, const Snapshot& snapshot,
+                                                     const Camera& camera, std::size_t object);
+
+struct GlSection {
+  GlMesh mesh;
+  GlName image = 0;
+  std::uint64_t image_number = 0, shape_number = 0, moved_number = 0;  // as uploaded; of TissueSlice
+
+  void upload(const Section& section, const DrawMesh& moved, const SectionImage& image_of_section);
+  void release();
+};
+
+struct SceneMesh {
+  GlMesh mesh;
+  bool soft = false;
+  bool lit_by_vertex = false;
+  bool closed = false;  // as is_closed_outwards() says
+  glm::vec3 colour{1.0F};
+  SceneBounds bounds;         // at rest
+  glm::mat4 placed{1.0F};     // from the uploaded pose to the present one
+  float most_moved_m = 0.0F;  // of a vertex, from its place at rest
+  std::vector<GlSection> slices;
+  GlSection face;            // face of the cut in the present view; empty: no cut
+  glm::vec4 kept{kKeepAll};  // plane of the cut: the part on its positive side is drawn
+
+  // ---- of soft objects: what is uploaded ----
+  DrawMesh moving;
+  std::vector<glm::vec3> moved_m;
+  std::uint64_t values_number = 0;
+};
+
+class SceneMeshes {
+ public:
+  // Uploads the scene at rest, relative to `origin_m`. `light_vertices`: large meshes are lit at their
+  // vertices.
+  SceneMeshes(const DrawnScene& scene, const glm::dvec3& origin_m, bool light_vertices);
+  // Uploads what has moved.
+  void move(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue);
+  // Cuts the visible objects that a picture cuts in this view (section.h).
+  void cut(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const ViewSettings& view);
+  void release();
+
+  // Radius of a ball about the middle of `bounds` (the scene at rest) that contains all that is drawn; one of
+  // a few values (rounded_up()).
+  [[nodiscard]] double radius_m(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
+                                const SceneBounds& bounds) const;
+  [[nodiscard]] const std::vector<SceneMesh>& all() const { return meshes_; }
+
+ private:
+  void move_surface(SceneMesh& mesh, const std::vector<glm::dvec3>& at_rest,
+                    const std::vector<glm::vec3>& moved_m, const TissueView& tissue, std::size_t object);
+
+  glm::dvec3 origin_m_;
+  std::vector<SceneMesh> meshes_;  // [object]
+};
+
+}  // namespace hybrid

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/view/tissue_view.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "hybrid/view/palette.h"
+
+namespace hybrid {
+namespace {
+
+// Displacements below this share of the tool's radius do not start a scale, so that rounding does not show as
+// a pattern.
+constexpr double kLeastMoved = 1e-3;
+constexpr double kLeastStrain = 0.01;  // least end of the scale of strain
+// The scale of strain ends at this percentile of the places with at least kNoStrain. At the rim of a contact
+// single links have several times the strain of the tissue around them.
+constexpr double kStrainShare = 0.98;
+constexpr float kNoStrain = 1e-3F;
+
+bool needs_field(TissueColour colour) {
+  return colour == TissueColour::strain || colour == TissueColour::limits;
+}
+
+// Equal settings give equal numbers, in every view of a scene; never 0.
+std::uint64_t number_of(const ViewSettings& view) {
+  std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a
+  const auto add = [&hash](std::uint64_t word) {
+    for (int byte = 0; byte < 8; ++byte) hash = (hash ^ (word >> (8 * byte) & 0xFFU)) * 1099511628211ULL;
+  };
+  add(needs_field(view.colour) ? 1 : 0);
+  for (const SlicePlane& slice : view.slices) add(slice.on ? std::bit_cast<std::uint64_t>(slice.share) : 1);
+  return std::max<std::uint64_t>(hash, 1);
+}
+
+}  // namespace
+
+TissueView::TissueView(const DrawnScene& scene, const glm::dvec3& origin_m)
+    : scene_(scene),
+      origin_m_(origin_m),
+      box_(soft_box(scene)),
+      objects_(scene.objects.size()),
+      painted_grey_(scene.objects.size(), 0) {}
+
+void TissueView::set(const ViewSettings& view) {
+  const bool planes = fresh_ || view.slices != view_.slices;
+  const bool field = fresh_ || needs_field(view.colour) != needs_field(view_.colour);
+  const bool colour = view.colour != view_.colour;
+  fresh_ = false;
+  view_ = view;
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    if (!scene_.objects[o].soft) continue;
+    if (planes) make_slices(o);
+    if (planes || field) make_fields(o, field, true);
+    paint(o);
+  }
+  if (planes || field) {
+    ask();
+  } else if (colour) {
+    for (std::size_t o = 0; o < objects_.size(); ++o) {
+      if (objects_[o].taken) take(o, objects_[o].answer);
+    }
+  }
+}
+
+void TissueView::make_slices(std::size_t o) {
+  Object& object = objects_[o];
+  object.slices.clear();
+  painted_grey_[o] = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!view_.slices[axis].on || box_.empty) continue;
+    SectionPlane plane{box_.low_m, glm::dvec3(0.0)};
+    plane.point_m[static_cast<int>(axis)] = box_.place_m(axis, view_.slices[axis].share);
+    plane.normal[static_cast<int>(axis)] = 1.0;
+    TissueSlice slice;
+    slice.section = make_section(scene_.objects[o], plane);
+    if (slice.section.indices.empty()) continue;
+    slice.mesh = move_section(slice.section, {}, {}, false, origin_m_);
+    slice.shape_number = slice.moved_number = ++number_;
+    object.slices.push_back(std::move(slice));
+  }
+}
+
+void TissueView::make_fields(std::size_t o, bool surface, bool slices) {
+  Object& object = objects_[o];
+  const DrawnObject& drawn = scene_.objects[o];
+  const bool wanted = needs_field(view_.colour);
+  if (surface) {
+    object.surface.reset();
+    object.values.clear();
+    object.values_number = ++number_;
+    if (wanted) object.surface.emplace(drawn.inside, drawn.surface.vertices);
+  }
+  if (!slices) return;
+  object.nets.assign(object.slices.size(), {});
+  for (std::size_t s = 0; wanted && s < object.slices.size(); ++s)
+    object.nets[s].emplace(drawn.inside, object.slices[s].section.in_tissue);
+}
+
+// Slices show the scan as soon as it has been read.
+void TissueView::paint(std::size_t o) {
+  Object& object = objects_[o];
+  if (object.slices.empty()) return;
+  const ScanVolume* const scan = view_.grey ? scans_.of(o, scene_.objects[o]) : nullptr;
+  const bool grey = scan != nullptr;
+  if (object.slices.front().image_number != 0 && (painted_grey_[o] != 0) == grey) return;
+  painted_grey_[o] = grey ? 1 : 0;
+  const std::vector<glm::vec3> colours = palette::of_inside(scene_, o);
+  for (TissueSlice& slice : object.slices) {
+    slice.image = grey ? paint_grey(slice.section, *scan) : paint_materials(slice.section, colours);
+    slice.image_number = ++number_;
+  }
+}
+
+void TissueView::ask() {
+  auto asked = std::make_shared<AskedPoints>();
+  asked->number = number_of(view_);
+  asked->at_rest_m.resize(objects_.size());
+  bool any = false;
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    Object& object = objects_[o];
+    object.taken = false;
+    std::vector<glm::dvec3>& points = asked->at_rest_m[o];
+    const auto add = [&points](const std::vector<glm::dvec3>& more) {
+      points.insert(points.end(), more.begin(), more.end());
+    };
+    if (object.surface) add(object.surface->points_m());
+    for (std::size_t s = 0; s < object.slices.size(); ++s) {
+      add(object.slices[s].section.in_tissue);
+      if (object.nets[s]) add(object.nets[s]->points_m());
+    }
+    any = any || !points.empty();
+  }
+  asked_ = any ? std::move(asked) : nullptr;
+}
+
+void TissueView::take(const Snapshot& snapshot) {
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    if (view_.colour == TissueColour::displacement && o < snapshot.soft_moved_m.size()) {
+      float most = 0.0F;
+      for (const glm::vec3& by : snapshot.soft_moved_m[o]) most = std::max(most, glm::dot(by, by));
+      if (std::isfinite(most)) note_moved(std::sqrt(most));
+    }
+    if (asked_ == nullptr || snapshot.asked.number != asked_->number || o >= snapshot.asked.moved_m.size())
+      continue;
+    const std::vector<glm::vec3>& moved_m = snapshot.asked.moved_m[o];
+    if (moved_m.empty() || moved_m.size() != asked_->at_rest_m[o].size()) continue;
+    if (objects_[o].taken && objects_[o].answer == moved_m) continue;
+    objects_[o].answer = moved_m;
+    objects_[o].taken = true;
+    take(o, moved_m);
+  }
+}
+
+void TissueView::take(std::size_t o, const std::vector<glm::vec3>& moved_m) {
+  Object& object = objects_[o];
+  const std::span<const glm::vec3> all(moved_m);
+  std::size_t at = 0;
+  const auto next = [&](std::size_t count) {
+    at += count;
+    return all.subspan(at - count, count);
+  };
+  if (object.surface) {
+    object.values = object.surface->values(view_.colour, next(object.surface->points_m().size()));
+    object.values_number = ++number_;
+    if (view_.colour == TissueColour::strain) note_strain(object.values);
+  }
+  for (std::size_t s = 0; s < object.slices.size(); ++s) {
+    TissueSlice& slice = object.slices[s];
+    const std::span<const glm::vec3> nodes = next(slice.section.in_tissue.size());
+    std::vector<float> values;
+    if (object.nets[s]) {
+      values = object.nets[s]->values(view_.colour, next(object.nets[s]->points_m().size()));
+    } else {
+      for (const glm::vec3& by : nodes) values.push_back(glm::length(by));
+    }
+    if (view_.colour == TissueColour::strain) note_strain(values);
+    if (view_.colour == TissueColour::displacement) {
+      for (const float value : values) note_moved(value);
+    }
+    slice.mesh = move_section(slice.section, nodes, values, false, origin_m_);
+    slice.moved_number = ++number_;
+  }
+}
+
+void TissueView::note_moved(float moved_m) {
+  const auto size = static_cast<double>(moved_m);
+  if (std::isfinite(size) && size > std::max(most_moved_m_, kLeastMoved * scene_.tool_radius_m))
+    most_moved_m_ = palette::scale_end(size);
+}
+
+void TissueView::note_strain(std::vector<float> strains) {
+  std::erase_if(strains, [](float strain) { return !(strain >= kNoStrain); });
+  if (strains.empty()) return;
+  const auto at =
+      strains.begin() + static_cast<std::ptrdiff_t>(kStrainShare * static_cast<double>(strains.size() - 1));
+  std::nth_element(strains.begin(), at, strains.end());
+  const auto size = static_cast<double>(*at);
+  if (size > std::max(most_strain_, kLeastStrain)) most_strain_ = palette::scale_end(size);
+}
+
+ColourScale TissueView::scale() const {
+  switch (view_.colour) {
+    case TissueColour::material:
+      return {TissueColour::material, 0.0};
+    case TissueColour::displacement:
+      return {TissueColour::displacement, most_moved_m_};
+    case TissueColour::strain:
+      return {TissueColour::strain, std::max(most_strain_, kLeastStrain)};
+    case TissueColour::limits:
+      return {TissueColour::limits, 1.0};
+  }
+  return {};
+}
+
+}  // namespace hybrid

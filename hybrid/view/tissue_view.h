@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a view shows of soft objects besides their surfaces: slices, and the values that colour tissue. Says
+// which displacements it needs, and takes them from snapshots. Knows no graphics library.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hybrid/snapshot/snapshot.h"
+#include "hybrid/view/tissue/scan_values.h"
+#include "hybrid/view/tissue/section.h"
+#include "hybrid/view/view_settings.h"
+
+namespace hybrid {
+
+// The scale of colours: from 0 to `end`. 0: nothing is coloured.
+struct ColourScale {
+  TissueColour colour = TissueColour::displacement;
+  double end = 0.0;  // m; for strain and limits a share
+};
+
+struct TissueSlice {
+  Section section;
+  SectionImage image;
+  DrawMesh mesh;                                     // relative to the view's origin
+  std::uint64_t image_number = 0;                    // rises when the image changes
+  std::uint64_t shape_number = 0, moved_number = 0;  // rise when the net, its places or values change
+};
+
+class TissueView {
+ public:
+  // Keeps a reference to the scene. `origin_m`: of the meshes.
+  TissueView(const DrawnScene& scene, const glm::dvec3& origin_m);
+
+  // Makes the slices and fields of these settings. Cheap if neither planes nor colouring have changed.
+  void set(const ViewSettings& view);
+  // The points whose displacements snapshots should carry (Snapshot::asked); null: none.
+  [[nodiscard]] const std::shared_ptr<const AskedPoints>& asked() const { return asked_; }
+  // Takes the displacements of a snapshot. If it has none for asked(), all stays as it was.
+  void take(const Snapshot& snapshot);
+
+  [[nodiscard]] const std::vector<TissueSlice>& slices(std::size_t object) const {
+    return objects_[object].slices;
+  }
+  // The value at each vertex of the surface, for strain and limits; otherwise empty.
+  [[nodiscard]] const std::vector<float>& values(std::size_t object) const { return objects_[object].values; }
+  // Rises when values() changes.
+  [[nodiscard]] std::uint64_t values_number(std::size_t object) const {
+    return objects_[object].values_number;
+  }
+  // The scale of the present colouring. Its end is a round number that never falls, so that colours keep
+  // their meaning from frame to frame. A few places of tissue may have a larger strain.
+  [[nodiscard]] ColourScale scale() const;
+  // As Scans::in_words().
+  [[nodiscard]] std::string in_words() const { return view_.grey ? scans_.in_words() : std::string(); }
+
+ private:
+  struct Object {
+    std::vector<TissueSlice> slices;
+    std::vector<float> values;
+    std::uint64_t values_number = 0;
+    std::optional<TissueField> surface;            // for strain and limits
+    std::vector<std::optional<TissueField>> nets;  // [slice] as `surface`
+    std::vector<glm::vec3> answer;                 // the displacements that were taken last
+    bool taken = false;                            // `answer` belongs to the present points
+  };
+  void make_fields(std::size_t object, bool surface, bool slices);
+  void make_slices(std::size_t object);
+  void paint(std::size_t object);
+  void ask();
+  void take(std::size_t object, const std::vector<glm::vec3>& moved_m);
+  void note_moved(float moved_m);
+  void note_strain(std::vector<float> strains);
+
+  const DrawnScene& scene_;
+  glm::dvec3 origin_m_;
+  SoftBox box_;
+  ViewSettings view_;
+  bool fresh_ = true;  // no settings were taken yet
+  std::vector<Object> objects_;
+  std::vector<std::uint8_t> painted_grey_;  // [object] its slices show grey values
+  std::shared_ptr<const AskedPoints> asked_;
+  Scans scans_;
+  std::uint64_t number_ = 0;
+  double most_moved_m_ = 0.0, most_strain_ = 0.0;  // ends of the scales
+};
+
+}  // namespace hybrid
