@@ -213,10 +213,7 @@ class ModelsRun {
     std::vector<std::vector<std::vector<double>>> passes(variants.size());
     std::vector<std::size_t> order;
     for (std::size_t n = 0; n < variants.size(); ++n) {
-      rows.push_back({.name = variants[n].name,
-                      .words = variants[n].words,
-                      .setting = variants[n].setting,
-                      .coupling_N_per_m = variants[n].coupling_N_per_m});
+      rows.push_back({.name = variants[n].name, .words = variants[n].words, .setting = variants[n].setting});
       rows.back().left_out = variants[n].left_out;
       order.push_back(n);
     }
@@ -292,12 +289,13 @@ class ModelsRun {
   }
 
   void play_matched(ObjectModels& object, const Variant& proxy) {
-    Variant matched = matched_variant(proxy, object.match ? object.match->stiffness_N_per_m : 0.0);
-    if (!object.match) {
-      matched.words = "rigid";
-      matched.left_out = !proxy.left_out.empty()
-                             ? proxy.left_out
-                             : "the contact has no force over depth to which it could be fitted";
+    Variant matched{.name = kMatchedVariant, .words = "rigid"};
+    if (object.match) {
+      matched = matched_variant(proxy, object.match->stiffness_N_per_m);
+    } else {
+      matched.left_out = proxy.left_out.empty()
+                             ? "the contact has no force over depth to which it could be fitted"
+                             : proxy.left_out;
     }
     std::vector<Variant> one{std::move(matched)};
     play(one, object.rows, object.object);

@@ -38,7 +38,7 @@ Json felt_json_of(const FeltModel& felt) {
 Json row_json(const ModelRow& row, const ObjectModels& object) {
   Json j{{"name", row.name}, {"values", row.words}};
   j["left_out"] = row.left_out.empty() ? Json(nullptr) : Json(row.left_out);
-  j["coupling_N_per_m"] = optional_json(row.coupling_N_per_m);
+  j["coupling_N_per_m"] = optional_json(row.coupling_N_per_m());
   if (!row.left_out.empty()) return j;
   j.update(felt_json_of(row.felt));
   j["direction_p50_deg"] = optional_json(row.felt.direction_p50_deg);
@@ -54,23 +54,12 @@ Json row_json(const ModelRow& row, const ObjectModels& object) {
   return j;
 }
 
-Json match_json(const std::optional<StiffnessMatch>& match) {
-  if (!match) return nullptr;
-  return {{"stiffness_N_per_m", match->stiffness_N_per_m},
-          {"rms_N", match->rms_N},
-          {"max_N", match->max_N},
-          {"depth_m", match->depth_m},
-          {"force_N", match->force_N},
-          {"from_s", match->from_s},
-          {"to_s", match->to_s}};
-}
-
 Json object_json(const ModelsInScene& models, const ObjectModels& object) {
   Json j{{"object", object.object}, {"rigid", object.rigid}, {"verdict", models_verdict(models, object)}};
   const auto best = cheapest_untold(object);
   j["cheapest_not_told_apart"] = best ? Json(object.rows[*best].name) : Json(nullptr);
   j["reference"] = felt_json_of(object.reference_felt);
-  j["match"] = match_json(object.match);
+  j["match"] = object.match ? to_json(*object.match) : Json(nullptr);
   j["models"] = Json::array();
   for (const ModelRow& row : object.rows) j["models"].push_back(row_json(row, object));
   return j;

@@ -177,7 +177,7 @@ std::string about_proxy(const ObjectModels& object) {
             ? "As rigid"
             : fmt::format("With the coupling fitted to it ({:.0f} N/m)", object.match->stiffness_N_per_m);
     text += fmt::format(" {} it is off by {:.1f} JND (p99).", how, row.felt.error.worst_jnd());
-    if (row.coupling_N_per_m && !object.alone)
+    if (row.coupling_N_per_m() && !object.alone)
       text += " That coupling is the tool's: the other objects would be felt through it, too.";
   }
   return text;
@@ -242,7 +242,7 @@ std::optional<std::size_t> cheapest_untold(const ObjectModels& object) {
   for (std::size_t n = 0; n < object.rows.size(); ++n) {
     const ModelRow& row = object.rows[n];
     if (!row.left_out.empty() || !row.faults.empty() || told_through_tool(row, object)) continue;
-    if (row.coupling_N_per_m && !object.alone) continue;  // it would change the other objects, too
+    if (row.coupling_N_per_m() && !object.alone) continue;  // it would change the other objects, too
     untold.push_back(n);
     least_us = std::min(least_us, row.tick_us.p999);
   }

@@ -103,6 +103,36 @@ std::string doubt_about_cost(const TuneResult& result) {
   return text;
 }
 
+bool voxels_left(const Setting& setting) {
+  return std::ranges::any_of(setting.objects, [](const ObjectSetting& one) { return !one.proxy; });
+}
+
+// Is a proxy enough? If not, how far off is the nearest one?
+std::string about_proxies(const TuneResult& result) {
+  const TunedSetting& chosen = result.settings[result.chosen];
+  if (chosen.match) {
+    return fmt::format(
+        "{} Its coupling is the tool's, so it is felt at every object. It fits depths up to {:.2f} mm, as on "
+        "this path.",
+        voxels_left(chosen.setting) ? "" : " A proxy is enough here: no voxels are needed.",
+        1e3 * chosen.match->depth_m);
+  }
+  if (!voxels_left(chosen.setting)) return " A proxy is enough here: no voxels are needed.";
+  const TunedSetting* nearest = nullptr;
+  for (const TunedSetting& s : result.settings) {
+    if (s.match && (nearest == nullptr || s.error.worst_jnd() < nearest->error.worst_jnd())) nearest = &s;
+  }
+  if (nearest == nullptr) return {};
+  const double everywhere = nearest->error.worst_jnd(), at_soft = nearest->at_soft.worst_jnd();
+  if (everywhere < result.bounds.error_jnd) return {};  // another rule decided
+  std::string text =
+      fmt::format(" A proxy is not enough here: {} is off by {:.2g} JND", nearest->words, at_soft);
+  if (everywhere > at_soft)
+    text +=
+        fmt::format(" at soft objects, and by {:.2g} JND where its coupling meets others, too", everywhere);
+  return text + ".";
+}
+
 std::string marked_words(const TunedSetting& s) {
   return s.words + (s.own ? " (as it is)" : "");
 }
@@ -210,11 +240,13 @@ nlohmann::ordered_json error_report(const SettingError& error) {
 nlohmann::ordered_json setting_report(const TuneResult& result, std::size_t n) {
   const TunedSetting& s = result.settings[n];
   nlohmann::ordered_json row{{"name", s.words}, {"toml", as_toml(s.setting)}, {"as_it_is", s.own}};
+  row["match"] = s.match ? to_json(*s.match) : nlohmann::ordered_json(nullptr);
   row["on_front"] = std::ranges::find(result.front, n) != result.front.end();
   row["dominated_by"] = s.dominated_by ? nlohmann::ordered_json(result.settings[*s.dominated_by].words)
                                        : nlohmann::ordered_json(nullptr);
   row["left_out"] = s.whole() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(s.left_out);
   row["error"] = error_report(s.error);
+  row["error_at_soft"] = error_report(s.at_soft);
   row["tick_us"] = to_json(s.tick_us);
   row["pass_p999_us"] = s.pass_p999_us;
   row["memory_bytes"] = s.memory_bytes;
@@ -262,15 +294,20 @@ std::string tune_verdict(const TuneResult& result) {
       break;
   }
   if (!result.choice.any_sound) text += " Every setting had a fault.";
-  return truth_warning(result) + text + doubt_about_error(result) + doubt_about_cost(result);
+  return truth_warning(result) + text + about_proxies(result) + doubt_about_error(result) +
+         doubt_about_cost(result);
 }
 
 std::string tune_reason(const TuneResult& result) {
   const TunedSetting& s = result.settings[result.chosen];
+  const std::string fitted =
+      s.match ? fmt::format("; its coupling fits the truth's force up to {:.2f} mm deep, {:.2f} N",
+                            1e3 * s.match->depth_m, s.match->force_N)
+              : "";
   return fmt::format(
-      "{}: {} (p99, the truth uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, {:.0f} us).",
+      "{}: {} (p99, the truth uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, {:.0f} us){}.",
       s.words, error_text(s.error), result.truth.error_jnd(), s.tick_us.p999, rule_name(result.choice.rule),
-      result.bounds.error_jnd, result.bounds.budget_us);
+      result.bounds.error_jnd, result.bounds.budget_us, fitted);
 }
 
 std::string tune_words(const TuneResult& result) {

@@ -12,6 +12,7 @@
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/models/models_text.h"
 #include "hybrid/models/variants.h"
+#include "hybrid/tune/edit_scene.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 
 namespace {
@@ -90,7 +91,7 @@ TEST_F(Models, OfASoftBlock) {
     if (!r.left_out.empty() || r.name == hybrid::kAsGiven) continue;
     ASSERT_TRUE(r.setting) << r.name;
     const std::string edited =
-        hybrid::variant_text(text, scene.file, models.tunable, *r.setting, r.coupling_N_per_m, "why");
+        hybrid::edited_scene(text, scene.file, models.tunable, *r.setting, "why", hybrid::kVariantMark);
     EXPECT_THAT(edited, HasSubstr("# the tool\n"));
     EXPECT_THAT(edited, HasSubstr("# of gel\n"));
     EXPECT_THAT(edited, HasSubstr("# hybrid compare: why\n"));

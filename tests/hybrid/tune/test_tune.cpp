@@ -5,7 +5,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "device/loop/stop_signal.h"
@@ -163,6 +165,55 @@ TEST_F(Tune, AVerdictSaysFirstThatTheTruthIsTooUncertainForIt) {
   EXPECT_THAT(hybrid::tune_verdict(one_setting(4.8, 0.5)),
               testing::StartsWith("The truth is itself uncertain by 4.80 JND, so no setting is shown"));
   EXPECT_THAT(hybrid::tune_verdict(one_setting(0.2, 1.9)), HasSubstr("off by 1.90 JND, more than the bound"));
+}
+
+// A shallow press into soft gel, and then, if `rigid`, one onto a rigid box beside it.
+std::string gel_and_box(bool rigid) {
+  std::string text =
+      "format = 1\n[tool] # the tool\nradius = 4\nstiffness = 1500\n[material.gel]\nyoung = 12000\n[[soft]]\n"
+      "name = \"block\"\nformula = \"block\"\nsize = [24, 24, 10]\nspacing = 2\nmaterial = \"gel\"\n";
+  if (rigid)
+    text += "[[rigid]]\nname = \"box\"\nprimitive = \"box\"\nsize = [20, 20, 10]\nposition = [40, 0, 0]\n";
+  text += "[path]\nkind = \"waypoints\"\nspeed = 30\npoints = [[0, 0, 10], [0, 0, 7.2, 0.1], [0, 0, 10]";
+  if (rigid) text += ", [40, 0, 10], [40, 0, 8.5, 0.1], [40, 0, 10]";
+  return text + "]\n";
+}
+
+TEST_F(Tune, AProxyWithAFittedCouplingIsChosenWhereItIsEnough) {
+  const auto file = write("gel.toml", gel_and_box(false));
+  const Scene scene = hybrid::read_scene(file);
+  const TuneResult result = hybrid::tune(scene, {.quick = true, .cache = {}, .progress = {}});
+  const hybrid::TunedSetting& chosen = result.settings[result.chosen];
+  ASSERT_TRUE(chosen.match) << chosen.words;
+  EXPECT_TRUE(chosen.setting.objects[0].proxy);
+  EXPECT_NEAR(*chosen.setting.coupling_N_per_m, chosen.match->stiffness_N_per_m,
+              1e-3 * chosen.match->stiffness_N_per_m);
+  EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("A proxy is enough here"));
+  EXPECT_THAT(hybrid::tune_reason(result), HasSubstr("its coupling fits the truth's force up to"));
+
+  // The scene that is written is felt as the setting was.
+  std::ifstream in(file);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const std::string edited = hybrid::edited_scene(text, file, result.objects, chosen.setting, "why");
+  EXPECT_THAT(edited, HasSubstr("[tool] # the tool\n"));
+  EXPECT_THAT(edited, HasSubstr("model = \"proxy\""));
+  EXPECT_THAT(edited, HasSubstr("# hybrid tune: why\nstiffness = "));
+  const Scene written = hybrid::on_ideal_device(hybrid::load_scene(write("written.toml", edited)));
+  const auto played = hybrid::play_setting(written, kBlock, hybrid::scene_motion(written), {}).course;
+  const auto error = hybrid::felt_error(played, result.truth.course, result.floor_N, 1.0 / scene.rate_hz);
+  EXPECT_NEAR(error.worst_jnd(), chosen.error.worst_jnd(), 1e-9);
+}
+
+TEST_F(Tune, AFittedCouplingIsJudgedAtTheRigidObjectsToo) {
+  const Scene scene = hybrid::read_scene(write("both.toml", gel_and_box(true)));
+  const TuneResult result = hybrid::tune(scene, {.quick = true, .cache = {}, .progress = {}});
+  const auto fitted =
+      std::ranges::find_if(result.settings, [](const auto& s) { return s.match.has_value(); });
+  ASSERT_NE(fitted, result.settings.end());
+  EXPECT_LT(fitted->at_soft.worst_jnd(), 1.0);
+  EXPECT_GT(fitted->error.worst_jnd(), 5.0);
+  EXPECT_FALSE(result.settings[result.chosen].match);
+  EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("where its coupling meets others, too"));
 }
 
 TEST_F(Tune, APathThatTouchesNothingSoftIsRefused) {
