@@ -189,8 +189,8 @@ class ModelsRun {
     constexpr double kUsualRows = 7.0;  // of an object
     progress_.plan(static_cast<double>(compared) * kUsualRows * static_cast<double>(kPasses));
     if (!touches_soft()) return;
-    truth_scale_ = first_truth_scale(scene_, objects_, result_.notes);
-    progress_.plan(truth_weight(truth_scale_));
+    split_ = truth_split(scene_, objects_, result_.notes);
+    progress_.plan(truth_weight(split_));
   }
 
   void find_reference(bool soft) {
@@ -201,7 +201,7 @@ class ModelsRun {
     result_.truth = measure_truth({.as_read = scene_,
                                    .objects = objects_,
                                    .names = std::move(names),
-                                   .scale = truth_scale_,
+                                   .split = split_,
                                    .floor_N = result_.floor_N,
                                    .dt_s = result_.dt_s},
                                   motion_, cache, step_);
@@ -328,7 +328,7 @@ class ModelsRun {
   std::vector<TunableObject> objects_;
   Motion motion_;
   std::vector<GivenObject> given_;
-  double truth_scale_ = 0.0;
+  int split_ = kTruthSplit;
   ModelsInScene result_;
 };
 

@@ -198,7 +198,7 @@ Scene with_setting(const Scene& as_read, const Setting& setting) {
   return on_ideal_device(scene);
 }
 
-Scene as_reference(const Scene& as_read, const Setting& setting) {
+Scene as_reference(const Scene& as_read, const Setting& setting, int split) {
   Scene exact = as_read;
   Setting voxels{setting.objects};
   std::set<std::string> own_energy;
@@ -207,6 +207,7 @@ Scene as_reference(const Scene& as_read, const Setting& setting) {
     if (object == nullptr) continue;
     object->proxy = false;
     soft.thinning.reset();
+    soft.split = split;
     if (yields(exact, soft)) continue;
     object->energy = Energy::trilinear;
     own_energy.insert(soft.material);

@@ -72,8 +72,8 @@ double scale_of(const TunableObject& object, const ObjectSetting& setting);
 Scene with_setting(const Scene& as_read, const Setting& setting);
 
 // The most accurate scene at this setting's spacing: voxels everywhere, no thinning, the coupling as given,
-// and trilinear energy where the materials allow it.
-Scene as_reference(const Scene& as_read, const Setting& setting);
+// and trilinear energy where the materials allow it. Each voxel is divided into split³ parts.
+Scene as_reference(const Scene& as_read, const Setting& setting, int split = 1);
 
 // For example "2.5 mm six-link". If several objects differ: "block 2.5 mm six-link, bone proxy".
 std::string in_words(const Setting& setting, double unit_m);

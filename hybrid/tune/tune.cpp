@@ -85,18 +85,11 @@ class Search {
   }
 
   void plan(const std::vector<Setting>& settings) {
-    const double scale = truth_scale();
-    // Runs for the truth, for the truth of the confirming motion, and two for the truth's error.
-    progress_.plan(truth_weight(scale) + slow_weight(scale, kTruthSlower) / kOtherSpeed);
+    split_ = truth_split(as_read_, result_.objects, result_.notes);
+    // Runs for the truth and its error, and for the truth of the confirming motion.
+    progress_.plan(truth_weight(split_) + slow_weight(1.0 / split_, kTruthSlower) / kOtherSpeed);
     for (const Setting& setting : settings)
       progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
-  }
-
-  // Scale of the truth's spacing. It is greater than kTruthScale if there would be too many voxels.
-  double truth_scale() {
-    if (truth_scale_ > 0.0) return truth_scale_;
-    truth_scale_ = first_truth_scale(as_read_, result_.objects, result_.notes);
-    return truth_scale_;
   }
 
   void find_truth() {
@@ -117,11 +110,11 @@ class Search {
     }
   }
 
-  [[nodiscard]] TruthPlan truth_plan() {
+  [[nodiscard]] TruthPlan truth_plan() const {
     return {.as_read = as_read_,
             .objects = result_.objects,
             .names = names_,
-            .scale = truth_scale(),
+            .split = split_,
             .floor_N = result_.floor_N,
             .dt_s = dt_s()};
   }
@@ -350,7 +343,7 @@ class Search {
     Confirmation& confirmation = result_.confirmation;
     confirmation.motion = words;
     const ForceCourse truth =
-        slow_course(truth_plan(), result_.truth.setting, motion, words, kTruthSlower, cache_, step_);
+        slow_course(truth_plan(), result_.truth.grid, motion, words, kTruthSlower, cache_, step_);
     const auto felt = [](const ForceCourse& course) {
       return static_cast<double>(std::ranges::count_if(course, &CourseTick::soft));
     };
@@ -378,7 +371,7 @@ class Search {
   Scene own_;
   Motion motion_;
   std::vector<std::string> names_;
-  double truth_scale_ = 0.0;
+  int split_ = kTruthSplit;
   std::uint64_t part_ticks_ = 1;
   std::vector<Trial> trials_;
   struct Fitted {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 
 #include "hybrid/compare/compare.h"
 #include "hybrid/feel/just_noticeable.h"
@@ -83,6 +84,20 @@ TEST_F(Models, OfASoftBlock) {
   const auto json = hybrid::models_json(models);
   EXPECT_EQ(json.at("objects").at(0).at("models").size(), block.rows.size());
   EXPECT_FALSE(hybrid::to_svg(hybrid::models_figure(models, "gel")).empty());
+
+  // The tables fit into 100 columns, and have each figure of the row.
+  std::istringstream lines(hybrid::models_words(models));
+  std::size_t of_given = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const bool in_table = std::ranges::any_of(block.rows, [&](const ModelRow& r) {
+      return line.starts_with(r.name + " ") && line.find(": ") == std::string::npos;
+    });
+    if (in_table) {
+      EXPECT_LE(line.size(), 100U) << line;
+    }
+    of_given += line.starts_with("as given ") ? 1 : 0;
+  }
+  EXPECT_EQ(of_given, 2U);
 
   // Each variant that is written reads as the scene that was played, and keeps the comments.
   std::ifstream in(scene.file, std::ios::binary);

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "device/loop/stop_signal.h"
+#include "hybrid/build/build_objects.h"
 #include "hybrid/compare/compare.h"
 #include "hybrid/compare/compare_scenes.h"
 #include "hybrid/tune/edit_scene.h"
@@ -57,7 +58,7 @@ TEST_F(Tune, AnErrorIsWhatCompareSaysOfTheTwoFiles) {
 }
 
 TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
-  const Scene scene = hybrid::on_ideal_device(hybrid::load_scene(gel("a.toml", "2")));
+  Scene scene = hybrid::on_ideal_device(hybrid::load_scene(gel("a.toml", "2")));
   const Motion motion = hybrid::scene_motion(scene);
   const auto slow = [&](int slower) { return hybrid::play_slowly(scene, kBlock, motion, slower, {}); };
   const auto error = [&](const auto& x, const auto& y) { return hybrid::felt_error(x, y, 0.04, 1e-3); };
@@ -67,9 +68,59 @@ TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
   EXPECT_GT(itself.still.ticks, 50U);
   EXPECT_EQ(itself.moving.max_jnd, 0.0);
   EXPECT_EQ(itself.still.max_jnd, 0.0);
-  // With a slow-down factor of 1, the truth is the session itself. The block is too small for patches, which
-  // a slow run would widen.
+  // With a slow-down factor of 1, the truth of tissue that relaxes in the tick is the session itself. Tissue
+  // that yields does. The block is too small for patches, which a slow run would widen.
+  scene.materials.at("gel").yield = 0.4;
   EXPECT_EQ(error(slow(1), hybrid::play_setting(scene, kBlock, motion, {}).course).worst_jnd(), 0.0);
+}
+
+// A divided voxel is the same body, so surfaces, materials and anchors stay in place.
+TEST_F(Tune, ATruthHasTheScenesOwnShape) {
+  const Scene scene =
+      hybrid::read_scene(write("ball.toml",
+                               "format = 1\n[material.gel]\nyoung = 8000\n[[soft]]\nname = \"ball\"\n"
+                               "formula = \"ball\"\nsize = 20\nspacing = 3\nposition = [1, 2, 3]\n" +
+                                   tests::path));
+  const auto objects = hybrid::tunable_objects(scene);
+  const auto volume = [&](int split) {
+    std::vector<hybrid::BuildNote> notes;
+    return hybrid::build_volume(hybrid::as_reference(scene, hybrid::own_setting(objects), split).soft.front(),
+                                notes);
+  };
+  const auto own = volume(1), divided = volume(2);
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto axis = static_cast<int>(d);
+    ASSERT_EQ(divided.dims[d], 2 * own.dims[d]);
+    EXPECT_DOUBLE_EQ(divided.spacing_m[axis], 0.5 * own.spacing_m[axis]);
+    EXPECT_NEAR(divided.origin_m[axis] - 0.5 * divided.spacing_m[axis],
+                own.origin_m[axis] - 0.5 * own.spacing_m[axis], 1e-12);
+  }
+  for (int k = 0; k < divided.dims[2]; ++k) {
+    for (int j = 0; j < divided.dims[1]; ++j) {
+      for (int i = 0; i < divided.dims[0]; ++i)
+        ASSERT_EQ(divided.labels[divided.index(i, j, k)], own.labels[own.index(i / 2, j / 2, k / 2)]);
+    }
+  }
+}
+
+// Results of relaxation are not late in a truth. So divided voxels come to rest as soon as undivided ones:
+// the force hardly depends on how slowly the truth is played.
+TEST_F(Tune, ATruthIsAtRestOnDividedVoxels) {
+  const Scene scene = hybrid::read_scene(
+      write("big.toml",
+            "format = 1\n[tool]\nradius = 5\nstiffness = 800\n[material.gel]\nyoung = 8000\n"
+            "[[rigid]]\nname = \"near\"\nprimitive = \"box\"\nsize = [4, 4, 4]\nposition = [30, 0, 0]\n"
+            "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [48, 48, 24]\nspacing = 2\n"
+            "material = \"gel\"\n[path]\nkind = \"press\"\nfrom = [0, 0, 20]\nto = [0, 0, 13]\n"
+            "hold = 0.2\nspeed = 60\n"));
+  const auto objects = hybrid::tunable_objects(scene);
+  const Scene fine = hybrid::as_reference(scene, hybrid::own_setting(objects), 2);
+  const Motion motion = hybrid::scene_motion(fine);
+  const auto slow = [&](int slower) { return hybrid::play_slowly(fine, kBlock, motion, slower, {}); };
+  const auto error = hybrid::felt_error(slow(10), slow(20), 0.04, 1e-3);
+  EXPECT_GT(error.still.ticks, 100U);
+  EXPECT_LT(error.still.p50_jnd, 0.05);
+  EXPECT_LT(error.worst_jnd(), 0.5);
 }
 
 void expect_equal(const TuneResult& a, const TuneResult& b, bool times) {
