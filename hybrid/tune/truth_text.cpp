@@ -25,18 +25,17 @@ std::string in_words(const SettingError& error) {
 
 std::string truth_words(const Truth& truth) {
   std::string text = fmt::format(
-      "truth: {}, no thinning, played {} times slower;\n  its own error (p99, extrapolated): {} from {}, {} "
-      "from twice the speed\n",
-      truth.words, kTruthSlower, in_words(truth.spacing),
-      truth.own_shape ? "voxels twice as wide of the same shape"
-                      : "voxels twice as wide, whose shape differs",
-      in_words(truth.rest));
+      "truth: {}, no thinning, played {} times slower; its own error (p99, extrapolated)\n"
+      "  of its spacing, from voxels twice as wide{}: {}\n"
+      "  of its speed, from twice the speed: {}\n",
+      truth.words, kTruthSlower, truth.own_shape ? " of the same shape" : ", whose shape differs",
+      in_words(truth.spacing), in_words(truth.rest));
   if (truth.rest.worst_jnd() > 1.0)
     text += "  the truth does not come to rest within 1 JND: played slower still, its force differs\n";
   if (truth.shape) {
-    text += fmt::format(
-        "  apart from that: read at half the spacing the objects have other shapes, which are felt with {}\n",
-        in_words(*truth.shape));
+    text +=
+        fmt::format("  apart from that: read at half the spacing the objects have other shapes, felt by {}\n",
+                    in_words(*truth.shape));
   }
   return text;
 }
