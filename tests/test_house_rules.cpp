@@ -134,10 +134,11 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"window", {"view"}},
         {"stress", {"session", "view"}},
         {"bench/reports", {}},
+        {"bench/scenes", {"models"}},
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
         {"validate", {"page", "compare"}},
-        {"program", {"bench", "bench/reports", "stability", "models", "validate", "window"}}}},
+        {"program", {"bench", "bench/reports", "bench/scenes", "stability", "validate", "window"}}}},
       {"interface", {{"", {}}, {"examples", {}}}},
   };
   return kRooms;

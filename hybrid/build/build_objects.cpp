@@ -219,8 +219,34 @@ double map_margin_m(const RigidDescription& description) {
   return 0.0;
 }
 
+namespace {
+
+voxel::LabelVolume divided(const voxel::LabelVolume& volume, int parts) {
+  voxel::LabelVolume fine;
+  for (std::size_t d = 0; d < 3; ++d) fine.dims[d] = volume.dims[d] * parts;
+  fine.spacing_m = volume.spacing_m / static_cast<double>(parts);
+  fine.rotation = volume.rotation;
+  fine.origin_m = volume.origin_m - volume.rotation * (0.5 * (volume.spacing_m - fine.spacing_m));
+  double voxels = 1.0;
+  for (const int n : fine.dims) voxels *= n;
+  if (voxels > static_cast<double>(max_lattice_voxels()))
+    throw std::runtime_error(
+        fmt::format("divided into {} parts along each axis, its voxels do not fit", parts));
+  fine.labels.reserve(static_cast<std::size_t>(voxels));
+  for (int k = 0; k < fine.dims[2]; ++k) {
+    for (int j = 0; j < fine.dims[1]; ++j) {
+      for (int i = 0; i < fine.dims[0]; ++i)
+        fine.labels.push_back(volume.labels[volume.index(i / parts, j / parts, k / parts)]);
+    }
+  }
+  return fine;
+}
+
+}  // namespace
+
 voxel::LabelVolume build_volume(const SoftDescription& description, std::vector<BuildNote>& notes) {
   voxel::LabelVolume volume = std::visit(VolumeBuilder{description, notes}, description.source);
+  if (description.split > 1) volume = divided(volume, description.split);
   const Pose& pose = description.pose;
   volume.origin_m = pose.position_m + pose.rotation * volume.origin_m;
   volume.rotation = pose.rotation * volume.rotation;

@@ -190,7 +190,7 @@ class Builder {
 
   void use_patches(const std::vector<Box>& boxes, std::size_t o) {
     voxel::SoftObject& object = *built_.state->soft[o];
-    if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid) return;
+    if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid || !scene_.soft[o].patches) return;
     const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
     std::string obstacle = may_meet(boxes, o);
     if (obstacle.empty()) obstacle = object.use_composite_grid(tool);

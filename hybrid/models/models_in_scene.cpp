@@ -189,8 +189,8 @@ class ModelsRun {
     constexpr double kUsualRows = 7.0;  // of an object
     progress_.plan(static_cast<double>(compared) * kUsualRows * static_cast<double>(kPasses));
     if (!touches_soft()) return;
-    truth_scale_ = first_truth_scale(scene_, objects_, result_.notes);
-    progress_.plan(truth_weight(truth_scale_));
+    split_ = truth_split(scene_, objects_, result_.notes);
+    progress_.plan(truth_weight(split_));
   }
 
   void find_reference(bool soft) {
@@ -201,7 +201,7 @@ class ModelsRun {
     result_.truth = measure_truth({.as_read = scene_,
                                    .objects = objects_,
                                    .names = std::move(names),
-                                   .scale = truth_scale_,
+                                   .split = split_,
                                    .floor_N = result_.floor_N,
                                    .dt_s = result_.dt_s},
                                   motion_, cache, step_);
@@ -213,10 +213,7 @@ class ModelsRun {
     std::vector<std::vector<std::vector<double>>> passes(variants.size());
     std::vector<std::size_t> order;
     for (std::size_t n = 0; n < variants.size(); ++n) {
-      rows.push_back({.name = variants[n].name,
-                      .words = variants[n].words,
-                      .setting = variants[n].setting,
-                      .coupling_N_per_m = variants[n].coupling_N_per_m});
+      rows.push_back({.name = variants[n].name, .words = variants[n].words, .setting = variants[n].setting});
       rows.back().left_out = variants[n].left_out;
       order.push_back(n);
     }
@@ -292,12 +289,13 @@ class ModelsRun {
   }
 
   void play_matched(ObjectModels& object, const Variant& proxy) {
-    Variant matched = matched_variant(proxy, object.match ? object.match->stiffness_N_per_m : 0.0);
-    if (!object.match) {
-      matched.words = "rigid";
-      matched.left_out = !proxy.left_out.empty()
-                             ? proxy.left_out
-                             : "the contact has no force over depth to which it could be fitted";
+    Variant matched{.name = kMatchedVariant, .words = "rigid"};
+    if (object.match) {
+      matched = matched_variant(proxy, object.match->stiffness_N_per_m);
+    } else {
+      matched.left_out = proxy.left_out.empty()
+                             ? "the contact has no force over depth to which it could be fitted"
+                             : proxy.left_out;
     }
     std::vector<Variant> one{std::move(matched)};
     play(one, object.rows, object.object);
@@ -330,7 +328,7 @@ class ModelsRun {
   std::vector<TunableObject> objects_;
   Motion motion_;
   std::vector<GivenObject> given_;
-  double truth_scale_ = 0.0;
+  int split_ = kTruthSplit;
   ModelsInScene result_;
 };
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "hybrid/models/felt_stiffness.h"
+#include "hybrid/tune/felt_stiffness.h"
 #include "hybrid/tune/truth.h"
 
 namespace hybrid {
@@ -31,7 +31,6 @@ struct FeltModel {
 struct ModelRow {
   std::string name{}, words{};  // as in Variant, like the next two
   std::optional<Setting> setting{};
-  std::optional<double> coupling_N_per_m{};
   std::string left_out{};  // why it was not played; empty if it was
   ForceCourse course{};    // soft: the object is touched
   FeltModel felt{};
@@ -39,6 +38,10 @@ struct ModelRow {
   double load_s = 0.0;
   std::uint64_t memory_bytes = 0, soft_voxels = 0;
   std::vector<std::string> faults{};
+  // Stiffness of the tool's coupling; empty: as the scene has it.
+  [[nodiscard]] std::optional<double> coupling_N_per_m() const {
+    return setting ? setting->coupling_N_per_m : std::nullopt;
+  }
 };
 
 struct ObjectModels {

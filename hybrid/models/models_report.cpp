@@ -10,6 +10,7 @@
 #include "hybrid/models/variants.h"
 #include "hybrid/plot/compare_plot.h"
 #include "hybrid/session/report.h"
+#include "hybrid/tune/truth_text.h"
 
 namespace hybrid {
 namespace {
@@ -18,14 +19,6 @@ using Json = nlohmann::ordered_json;
 
 Json optional_json(const std::optional<double>& value) {
   return value ? Json(*value) : Json(nullptr);
-}
-
-Json ticks_error(const FeltError& e) {
-  return {{"ticks", e.ticks},
-          {"jnd_p50", e.p50_jnd},
-          {"jnd_p99", e.p99_jnd},
-          {"jnd_max", e.max_jnd},
-          {"max_t_s", e.ticks > 0 ? Json(e.max_t_s) : Json(nullptr)}};
 }
 
 Json felt_json_of(const FeltModel& felt) {
@@ -38,13 +31,14 @@ Json felt_json_of(const FeltModel& felt) {
 Json row_json(const ModelRow& row, const ObjectModels& object) {
   Json j{{"name", row.name}, {"values", row.words}};
   j["left_out"] = row.left_out.empty() ? Json(nullptr) : Json(row.left_out);
-  j["coupling_N_per_m"] = optional_json(row.coupling_N_per_m);
+  j["coupling_N_per_m"] = optional_json(row.coupling_N_per_m());
   if (!row.left_out.empty()) return j;
   j.update(felt_json_of(row.felt));
   j["direction_p50_deg"] = optional_json(row.felt.direction_p50_deg);
   j["direction_p99_deg"] = optional_json(row.felt.direction_p99_deg);
-  j["error_moving"] = ticks_error(row.felt.error.moving);
-  j["error_still"] = ticks_error(row.felt.error.still);
+  const Json errors = to_json(row.felt.error);
+  j["error_moving"] = errors.at("moving");
+  j["error_still"] = errors.at("still");
   j["told_apart_by"] = told_apart_by(row, object);
   j["tick_us"] = to_json(row.tick_us);
   j["load_s"] = row.load_s;
@@ -54,23 +48,12 @@ Json row_json(const ModelRow& row, const ObjectModels& object) {
   return j;
 }
 
-Json match_json(const std::optional<StiffnessMatch>& match) {
-  if (!match) return nullptr;
-  return {{"stiffness_N_per_m", match->stiffness_N_per_m},
-          {"rms_N", match->rms_N},
-          {"max_N", match->max_N},
-          {"depth_m", match->depth_m},
-          {"force_N", match->force_N},
-          {"from_s", match->from_s},
-          {"to_s", match->to_s}};
-}
-
 Json object_json(const ModelsInScene& models, const ObjectModels& object) {
   Json j{{"object", object.object}, {"rigid", object.rigid}, {"verdict", models_verdict(models, object)}};
   const auto best = cheapest_untold(object);
   j["cheapest_not_told_apart"] = best ? Json(object.rows[*best].name) : Json(nullptr);
   j["reference"] = felt_json_of(object.reference_felt);
-  j["match"] = match_json(object.match);
+  j["match"] = object.match ? to_json(*object.match) : Json(nullptr);
   j["models"] = Json::array();
   for (const ModelRow& row : object.rows) j["models"].push_back(row_json(row, object));
   return j;
@@ -78,14 +61,7 @@ Json object_json(const ModelsInScene& models, const ObjectModels& object) {
 
 Json reference_json(const ModelsInScene& models) {
   if (!models.truth) return {{"setting", "the scene as given, which is exact"}, {"error_jnd", 0.0}};
-  const Truth& truth = *models.truth;
-  return {
-      {"setting", truth.words},
-      {"slower", kTruthSlower},
-      {"spacing_error",
-       {{"moving", ticks_error(truth.spacing.moving)}, {"still", ticks_error(truth.spacing.still)}}},
-      {"rest_error", {{"moving", ticks_error(truth.rest.moving)}, {"still", ticks_error(truth.rest.still)}}},
-      {"error_jnd", truth.error_jnd()}};
+  return to_json(*models.truth);
 }
 
 // A course as rows for a figure. The contact bit says that the object is touched.

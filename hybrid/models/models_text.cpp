@@ -7,10 +7,12 @@
 #include <cmath>
 #include <limits>
 
+#include "hybrid/base/number_text.h"
 #include "hybrid/base/table.h"
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/models/variants.h"
 #include "hybrid/session/report.h"
+#include "hybrid/tune/truth_text.h"
 
 namespace hybrid {
 namespace {
@@ -26,13 +28,19 @@ bool told_through_tool(const ModelRow& row, const ObjectModels& object) {
                              [](const std::string& by) { return by != kByFinger; });
 }
 
+// With three digits, but no decimals from 100 on.
+std::string short_number(double value) {
+  return with_decimals(value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0);
+}
+
 std::string error_cells(const FeltError& e) {
-  return e.ticks > 0 ? fmt::format("{:.2f}/{:.2f}/{:.2f}", e.p50_jnd, e.p99_jnd, e.max_jnd) : "-";
+  if (e.ticks == 0) return "-";
+  return fmt::format("{}/{}/{}", short_number(e.p50_jnd), short_number(e.p99_jnd), short_number(e.max_jnd));
 }
 
 std::string direction_cells(const FeltModel& felt) {
   if (!felt.direction_p99_deg) return "-";
-  return fmt::format("{:.1f}/{:.1f}", *felt.direction_p50_deg, *felt.direction_p99_deg);
+  return fmt::format("{}/{}", short_number(*felt.direction_p50_deg), short_number(*felt.direction_p99_deg));
 }
 
 std::string stiffness_cell(const ModelRow& row, const ObjectModels& object) {
@@ -53,37 +61,50 @@ std::string joined(const std::vector<std::string>& parts, const char* nothing) {
   return text.empty() ? nothing : text;
 }
 
-Table<ModelRow> model_table(const ObjectModels& object) {
+// A figure that only a finger feels stands in brackets.
+std::string told_cell(const ModelRow& row, const ObjectModels& object) {
+  std::vector<std::string> by = told_apart_by(row, object);
+  std::ranges::replace(by, std::string(kByFinger), std::string("(stiffness)"));
+  return " " + joined(by, "nothing");
+}
+
+// Two tables, each at most 100 columns wide: what the hand feels of each model, and what it is and costs.
+Table<ModelRow> felt_table(const ObjectModels& object) {
+  using Row = ModelRow;
+  const ObjectModels* const all = &object;
+  return Table<Row>({
+      {{"model"}, 0, Side::left, [](const Row& r) { return r.name; }},
+      {{"moving JND", "p50/p99/max"},
+       0,
+       Side::right,
+       [](const Row& r) { return error_cells(r.felt.error.moving); }},
+      {{"still JND", "p50/p99/max"},
+       0,
+       Side::right,
+       [](const Row& r) { return error_cells(r.felt.error.still); }},
+      {{"angle deg", "p50/p99"}, 0, Side::right, [](const Row& r) { return direction_cells(r.felt); }},
+      {{"stiffness", "N/m (off)"}, 0, Side::right, [all](const Row& r) { return stiffness_cell(r, *all); }},
+      {{" told apart", " by"}, 0, Side::left, [all](const Row& r) { return told_cell(r, *all); }},
+  });
+}
+
+Table<ModelRow> cost_table(const ObjectModels& object) {
   using Row = ModelRow;
   const ObjectModels* const all = &object;
   return Table<Row>({
       {{"model"}, 0, Side::left, [](const Row& r) { return r.name; }},
       {{"values"}, 0, Side::left, [](const Row& r) { return r.words; }},
       {{"force N", "p50/max"},
-       9,
+       0,
        Side::right,
        [](const Row& r) { return fmt::format("{:.3f}/{:.3f}", r.felt.force_p50_N, r.felt.force_max_N); }},
-      {{"moving JND", "p50/p99/max"},
-       12,
-       Side::right,
-       [](const Row& r) { return error_cells(r.felt.error.moving); }},
-      {{"still JND", "p50/p99/max"},
-       12,
-       Side::right,
-       [](const Row& r) { return error_cells(r.felt.error.still); }},
-      {{"dir deg", "p50/p99"}, 8, Side::right, [](const Row& r) { return direction_cells(r.felt); }},
-      {{"stiffness", "N/m (off)"}, 10, Side::right, [all](const Row& r) { return stiffness_cell(r, *all); }},
-      {{"onset ms", "later"}, 8, Side::right, [all](const Row& r) { return onset_cell(r, *all); }},
-      {{"tick us", "p50/p99/p99.9/max"}, 18, Side::right, [](const Row& r) { return in_words(r.tick_us); }},
+      {{"onset ms", "later"}, 0, Side::right, [all](const Row& r) { return onset_cell(r, *all); }},
+      {{"tick us", "p50/p99/p99.9/max"}, 0, Side::right, [](const Row& r) { return in_words(r.tick_us); }},
       {{"MB"},
-       6,
+       0,
        Side::right,
        [](const Row& r) { return fmt::format("{:.1f}", 1e-6 * static_cast<double>(r.memory_bytes)); }},
-      {{"load s"}, 6, Side::right, [](const Row& r) { return fmt::format("{:.2f}", r.load_s); }},
-      {{" told apart", " by"},
-       0,
-       Side::left,
-       [all](const Row& r) { return " " + joined(told_apart_by(r, *all), "nothing"); }},
+      {{"load s"}, 0, Side::right, [](const Row& r) { return fmt::format("{:.2f}", r.load_s); }},
   });
 }
 
@@ -106,12 +127,11 @@ std::string match_line(const StiffnessMatch& m) {
 std::string object_words(const ModelsInScene& models, const ObjectModels& object) {
   std::string text = fmt::format("\"{}\", {} in the scene\n{}\n\n", object.object,
                                  object.rigid ? "rigid" : "soft", models_verdict(models, object));
-  Table<ModelRow> table = model_table(object);
   std::vector<ModelRow> played;
   for (const ModelRow& row : object.rows) {
     if (row.left_out.empty()) played.push_back(row);
   }
-  text += table.text(played);
+  text += felt_table(object).text(played) + "\n" + cost_table(object).text(played);
   for (const ModelRow& row : object.rows) {
     if (!row.left_out.empty()) text += fmt::format("not played: {}: {}\n", row.name, row.left_out);
   }
@@ -123,20 +143,11 @@ std::string object_words(const ModelsInScene& models, const ObjectModels& object
   return text + "\n";
 }
 
-std::string error_of_truth(const SettingError& e) {
-  const auto one = [](const FeltError& f) { return f.ticks > 0 ? fmt::format("{:.2f}", f.p99_jnd) : "-"; };
-  return fmt::format("{} JND moving, {} still", one(e.moving), one(e.still));
-}
-
 std::string reference_words_of(const ModelsInScene& models) {
   if (!models.truth) {
     return "reference: the scene as given: nothing soft is touched, and the proxy's geometry is exact\n";
   }
-  const Truth& truth = *models.truth;
-  return fmt::format(
-      "reference: the scene with {}, no thinning, played {} times slower;\n  its own error (p99, "
-      "extrapolated): {} from voxels twice as wide, {} from twice the speed\n",
-      truth.words, kTruthSlower, error_of_truth(truth.spacing), error_of_truth(truth.rest));
+  return truth_words(*models.truth);
 }
 
 std::string figures_of(const ModelRow& row, const ObjectModels& object) {
@@ -177,7 +188,7 @@ std::string about_proxy(const ObjectModels& object) {
             ? "As rigid"
             : fmt::format("With the coupling fitted to it ({:.0f} N/m)", object.match->stiffness_N_per_m);
     text += fmt::format(" {} it is off by {:.1f} JND (p99).", how, row.felt.error.worst_jnd());
-    if (row.coupling_N_per_m && !object.alone)
+    if (row.coupling_N_per_m() && !object.alone)
       text += " That coupling is the tool's: the other objects would be felt through it, too.";
   }
   return text;
@@ -212,7 +223,7 @@ std::string models_legend(const ModelsInScene& models) {
       "stiffness: slope of the force over the depth of the tool in the undeformed object, while it first "
       "goes deeper\n"
       "told apart by: force, if p99 is above 1 JND; direction, above {} degrees; stiffness, off by more than "
-      "{:.0f} % (with\n  a finger on the surface: {:.0f} %)\n"
+      "{:.0f} % (with\n  a finger on the surface: {:.0f} %, in brackets)\n"
       "ticks: median of three sessions in alternating order, over the whole path, not pinned to a core; "
       "compare ratios\n",
       100.0 * kJndShare, models.floor_N, kDirectionJnd_deg, 100.0 * kStiffnessJndTool,
@@ -242,7 +253,7 @@ std::optional<std::size_t> cheapest_untold(const ObjectModels& object) {
   for (std::size_t n = 0; n < object.rows.size(); ++n) {
     const ModelRow& row = object.rows[n];
     if (!row.left_out.empty() || !row.faults.empty() || told_through_tool(row, object)) continue;
-    if (row.coupling_N_per_m && !object.alone) continue;  // it would change the other objects, too
+    if (row.coupling_N_per_m() && !object.alone) continue;  // it would change the other objects, too
     untold.push_back(n);
     least_us = std::min(least_us, row.tick_us.p999);
   }

@@ -5,13 +5,10 @@
 
 #include <algorithm>
 #include <array>
-#include <stdexcept>
 
 #include "hybrid/base/number_text.h"
 #include "hybrid/build/choose_model.h"
 #include "hybrid/compare/compare.h"
-#include "hybrid/scene/edit_text.h"
-#include "hybrid/tune/edit_scene.h"
 
 namespace hybrid {
 namespace {
@@ -141,22 +138,6 @@ Variant as_given(const Scene& as_read, const std::vector<TunableObject>& objects
   return variant;
 }
 
-std::string variant_text(const std::string& text, const std::filesystem::path& file,
-                         const std::vector<TunableObject>& objects, const Setting& setting,
-                         const std::optional<double>& coupling_N_per_m, const std::string& reason) {
-  constexpr std::string_view kMark = "# hybrid compare: ";
-  std::string edited = edited_scene(text, file, objects, setting, reason, kMark);
-  if (!coupling_N_per_m) return edited;
-  SceneTextEditor editor(std::move(edited), file);
-  const TextTable tool{"tool"};
-  const std::string why = editor.set(tool, "stiffness", with_digits(*coupling_N_per_m, kSpacingDigits));
-  if (!why.empty() || !editor.comment_above(tool, {"stiffness"}, std::string(kMark) + reason)) {
-    throw std::runtime_error(fmt::format("{}: stiffness in [tool] cannot be set to {} ({})", file.string(),
-                                         with_digits(*coupling_N_per_m, kSpacingDigits), why));
-  }
-  return editor.text();
-}
-
 std::vector<Variant> soft_variants(const Scene& as_read, const std::vector<TunableObject>& objects,
                                    std::size_t index) {
   std::vector<Variant> variants;
@@ -178,9 +159,9 @@ std::vector<Variant> soft_variants(const Scene& as_read, const std::vector<Tunab
 Variant matched_variant(const Variant& proxy, double stiffness_N_per_m) {
   Variant matched = proxy;
   matched.name = kMatchedVariant;
-  matched.words = fmt::format("rigid, {} N/m", with_digits(stiffness_N_per_m, 4));
-  matched.scene.tool.stiffness_N_per_m = stiffness_N_per_m;
-  matched.coupling_N_per_m = stiffness_N_per_m;
+  matched.setting = with_coupling(*proxy.setting, stiffness_N_per_m);
+  matched.scene.tool.stiffness_N_per_m = *matched.setting->coupling_N_per_m;
+  matched.words = fmt::format("rigid, {} N/m", coupling_text(*matched.setting->coupling_N_per_m));
   matched.left_out.clear();
   return matched;
 }

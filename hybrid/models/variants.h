@@ -3,9 +3,9 @@
 // it.
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hybrid/tune/setting.h"
@@ -18,9 +18,11 @@ struct Variant {
   Scene scene{};      // on an ideal device, with all models decided
   // What makes it, in the scene's file. Empty: the file cannot say it with a few values.
   std::optional<Setting> setting{};
-  std::optional<double> coupling_N_per_m{};  // stiffness of the tool; empty: as the scene has it
-  std::string left_out{};                    // why the scene cannot have it, in words; empty: it can
+  std::string left_out{};  // why the scene cannot have it, in words; empty: it can
 };
+
+// edited_scene() marks the reasons in the scene files of variants with it.
+inline constexpr std::string_view kVariantMark = "# hybrid compare: ";
 
 inline constexpr const char* kAsGiven = "as given";
 inline constexpr const char* kProxyVariant = "proxy";
@@ -30,18 +32,12 @@ inline constexpr const char* kVoxelVariant = "as voxels";
 // The scene as it is, on an ideal device. The variant's `words` describe `object`.
 Variant as_given(const Scene& as_read, const std::vector<TunableObject>& objects, const std::string& object);
 
-// The scene's text with these values in it, and `reason` as a comment. All other text stays. Throws
-// std::runtime_error: the text cannot be edited.
-std::string variant_text(const std::string& text, const std::filesystem::path& file,
-                         const std::vector<TunableObject>& objects, const Setting& setting,
-                         const std::optional<double>& coupling_N_per_m, const std::string& reason);
-
 // Variants of soft object number `index` of `objects`: six-link, trilinear, voxels 1.5 and 2 times as wide,
 // without thinning (if the scene thins it), and proxy. kMatchedVariant is made by matched_variant().
 std::vector<Variant> soft_variants(const Scene& as_read, const std::vector<TunableObject>& objects,
                                    std::size_t index);
 
-// A proxy whose coupling has another stiffness. The coupling is the tool's, so it acts on all objects.
+// A proxy whose coupling has another stiffness.
 Variant matched_variant(const Variant& proxy, double stiffness_N_per_m);
 
 // The rigid object as voxels of Young's modulus kVoxelYoung_Pa, held at their lowest layer. `extent_m`: edges

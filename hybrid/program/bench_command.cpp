@@ -11,6 +11,7 @@
 #include "hybrid/bench/occupancy.h"
 #include "hybrid/bench/occupancy_plot.h"
 #include "hybrid/bench/rigid.h"
+#include "hybrid/bench/scenes/bench_scenes.h"
 #include "hybrid/bench/soft.h"
 #include "hybrid/bench/threads.h"
 #include "hybrid/program/commands.h"
@@ -20,7 +21,8 @@
 namespace hybrid {
 namespace {
 
-constexpr int kSettlingRounds = 60;  // rounds of relaxation in the plot
+constexpr int kSettlingRounds = 60;    // rounds of relaxation in the plot
+constexpr int kQuickSceneRepeats = 3;  // timed sessions of a scene with --quick
 
 std::vector<bench::Engine> engines_of(const std::vector<std::string>& names) {
   std::vector<bench::Engine> engines;
@@ -186,6 +188,23 @@ void threads_suite(const BenchCommand& command, std::FILE* words, nlohmann::orde
   for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
 }
 
+// In "all" without scenes: those that come with the program.
+void scenes_suite(const BenchCommand& command, std::FILE* words, nlohmann::ordered_json& json) {
+  bench::ScenesBenchOptions options{.scenes = command.scenes, .progress = progress_on_terminal()};
+  if (options.scenes.empty()) options.scenes = bench::shipped_scenes();
+  if (command.quick) options.repeats = kQuickSceneRepeats;
+  options.on_row = [words, &json](const bench::SceneRow& row) {
+    end_progress();
+    json.push_back(bench::to_json(row));
+    fmt::print(words, "{}", bench::scenes_table_line(row));
+    std::fflush(words);
+  };
+  fmt::print(words, "whole scenes along their paths, on an ideal device\n{}", bench::scenes_table_head());
+  const std::vector<bench::SceneRow> rows = bench::bench_scenes(options);
+  end_progress();
+  fmt::print(words, "\n{}", bench::scenes_summary(rows));
+}
+
 template <class Engines>
 std::vector<std::string> names_of(const Engines& engines) {
   std::vector<std::string> names;
@@ -227,19 +246,19 @@ std::vector<SuiteNames> running_suites(const BenchCommand& command) {
 }  // namespace
 
 const std::vector<std::string>& bench_suites() {
-  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy", "threads"};
+  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy", "threads", "scenes"};
   return kSuites;
 }
 const std::vector<BenchOption>& bench_options() {
   static const std::vector<BenchOption> kOptions{
-      {"--quick", {"rigid", "soft", "occupancy"}},
+      {"--quick", {"rigid", "soft", "occupancy", "scenes"}},
       {"--every-tick", {"rigid"}},
       {"--only", {"rigid", "soft", "occupancy"}},
       {"--meshes", {"rigid"}},
       {"--unit", {"rigid"}},
       {"--sizes", {"soft"}},
       {"--cells", {"occupancy"}},
-      {"--scenes", {"threads"}},
+      {"--scenes", {"threads", "scenes"}},
       {"--seconds", {"soft", "threads"}},
       {"--engines", {"rigid", "soft", "occupancy"}},
       {"--trace", {"rigid"}},
@@ -315,8 +334,12 @@ void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered
   if (runs("occupancy")) occupancy_suite(command, words, outputs, rows_of("occupancy"));
   if (command.suite == "threads" && command.scenes.empty())
     throw std::invalid_argument("bench threads: no scene; say which, as in --scenes scenes/cube.toml");
+  if (command.suite == "scenes" && command.scenes.empty() && bench::shipped_scenes().empty())
+    throw std::invalid_argument("bench scenes: no scene; say which, as in bench scenes/cube.toml");
   if (!command.scenes.empty() && (command.suite == "all" || command.suite == "threads"))
     threads_suite(command, words, rows_of("threads"));
+  const bool all = command.suite == "all" && command.only.empty() && command.engines.empty();
+  if (command.suite == "scenes" || all) scenes_suite(command, words, rows_of("scenes"));
   if (!suites.empty()) return;
   throw std::invalid_argument(fmt::format(
       "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "

@@ -99,13 +99,14 @@ struct TuneCommand {
 int tune_scene(const TuneCommand& command);
 
 struct BenchCommand {
-  std::string suite;  // a name of bench_suites(), or "all"
+  std::vector<std::string> what;  // as typed: a suite, or scene files
+  std::string suite;              // a name of bench_suites(), or "all"
   bool quick = false, every_tick = false;
   std::vector<std::string> only, meshes, engines;  // empty: the suite chooses
   double mesh_unit_m = 1e-3;                       // rigid: length unit of mesh files
   std::vector<int> sizes;                          // soft: voxels along an edge; empty: the suite chooses
   std::vector<std::size_t> cells;                  // occupancy: occupied cells; empty: the suite chooses
-  std::vector<std::filesystem::path> scenes;       // threads: the scenes
+  std::vector<std::filesystem::path> scenes;       // threads, scenes: the scenes
   std::optional<double> session_s;  // soft: simulated time of a session; threads: real time of a load
   std::filesystem::path trace;      // folder of traces; empty: none
   std::filesystem::path plot;       // soft: relaxation per round; occupancy: times; empty: none

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "device/loop/stop_signal.h"
@@ -207,6 +208,31 @@ void refuse_unused(const CLI::App& bench, const std::string& suite) {
   }
 }
 
+CLI::Validator suite_or_scene(const std::vector<std::string>& suites) {
+  return {[suites](const std::string& name) {
+            return std::filesystem::is_regular_file(name) ? std::string()
+                                                          : hybrid::unknown_name(name, suites);
+          },
+          CLI::detail::generate_set(suites)};
+}
+
+// Sets suite and scenes from the arguments: one suite, or scene files, which are the suite "scenes".
+void take_suite(hybrid::BenchCommand& command, const std::vector<std::string>& suites) {
+  const auto is_suite = [&suites](const std::string& name) {
+    return std::find(suites.begin(), suites.end(), name) != suites.end();
+  };
+  if (command.what.size() == 1 && is_suite(command.what[0])) {
+    command.suite = command.what[0];
+    return;
+  }
+  for (const std::string& name : command.what) {
+    if (is_suite(name))
+      throw CLI::ValidationError("bench: " + name + " beside others; give one suite, or scene files alone");
+    command.scenes.emplace_back(name);
+  }
+  command.suite = "scenes";
+}
+
 CLI::App* add_bench_compare(CLI::App& bench, int& status) {
   auto* sub =
       bench.add_subcommand("compare",
@@ -243,7 +269,9 @@ void add_bench(CLI::App& app, int& status) {
   auto c = std::make_shared<hybrid::BenchCommand>();
   std::vector<std::string> suites = hybrid::bench_suites();
   suites.emplace_back("all");
-  sub->add_option("SUITE", c->suite, "what to time")->check(CLI::IsMember(suites));
+  sub->add_option("SUITE", c->what,
+                  "what to time: a suite, or scene files, each beside other models of its objects")
+      ->check(suite_or_scene(suites));
   sub->add_flag("--quick", c->quick, "a short piece of each path on small meshes; a few seconds");
   sub->add_flag("--every-tick", c->every_tick, "ask the exact reference at every tick; slow");
   sub->add_option("--only", c->only, "paths of rigid, cases of soft and occupancy, with commas between")
@@ -266,7 +294,7 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("--cells", c->cells, "of occupancy: occupied cells, about, with commas between")
       ->delimiter(',')
       ->check(CLI::Range(100, 20'000'000));
-  sub->add_option("--scenes", c->scenes, "of threads: scene files, with commas between")
+  sub->add_option("--scenes", c->scenes, "of threads and scenes: scene files, with commas between")
       ->delimiter(',')
       ->check(CLI::ExistingFile);
   sub->add_option("--seconds", c->session_s,
@@ -281,9 +309,10 @@ void add_bench(CLI::App& app, int& status) {
                   "cells (with all: beside it, NAME-occupancy.svg)");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   const CLI::App* compare = add_bench_compare(*sub, status);
-  sub->callback([c, sub, compare, &status] {
+  sub->callback([c, sub, compare, suites, &status] {
     if (compare->parsed()) return;
-    if (c->suite.empty()) throw CLI::RequiredError("SUITE");
+    if (c->what.empty()) throw CLI::RequiredError("SUITE");
+    take_suite(*c, suites);
     refuse_unused(*sub, c->suite);
     status = hybrid::run_bench(*c);
   });

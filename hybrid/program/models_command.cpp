@@ -15,6 +15,7 @@
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/session/report.h"
+#include "hybrid/tune/edit_scene.h"
 
 namespace hybrid {
 namespace {
@@ -40,8 +41,7 @@ void write_variants(const Scene& scene, const ModelsInScene& models, Outputs& ou
                                            file_part(object.object), file_part(row.name));
       const std::string reason = fmt::format("\"{}\" as {} ({})", object.object, row.name, row.words);
       outputs.write("scene", scene.file.parent_path() / name, [&](const std::filesystem::path& file) {
-        save_text(file,
-                  variant_text(text, scene.file, models.tunable, *row.setting, row.coupling_N_per_m, reason));
+        save_text(file, edited_scene(text, scene.file, models.tunable, *row.setting, reason, kVariantMark));
       });
     }
   }

@@ -196,6 +196,10 @@ struct SoftDescription {
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
   SourcePlace budget_place{};     // of the key; line 0: the default
   std::optional<Thinning> thinning{};
+  // Each voxel of the source is divided into split³ equal ones, so the shape stays. No key of a scene: it is
+  // for references.
+  int split = 1;
+  bool patches = true;  // false: never on nested patches. No key of a scene, either: it is for baselines.
   Energy energy = Energy::six_link;  // energy of materials that state none
   // As in the file. load_scene() moves objects that are felt through the proxy to Scene::rigid, so all that
   // stay in Scene::soft are felt through their voxels.

@@ -202,7 +202,7 @@ void publish_force(const World& world, WorldState& state, const Sweep& sweep,
   make_safe(world, state, coupling + added, input, dt_s, result);
   split_by_object(world, state, result.soft_N);
   for (std::size_t o = 0; o < state.feel.size(); ++o) {
-    if (state.feel[o].contact) result.contacts |= 1U << std::min<std::size_t>(o, 31);
+    if (state.feel[o].contact) result.contacts |= 1U << std::min(o, kLastContactBit);
   }
 }
 

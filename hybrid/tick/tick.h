@@ -25,6 +25,9 @@ inline constexpr std::size_t kStages = 7;
 inline constexpr std::array<const char*, kStages> kStageNames{
     "bodies", "broad_phase", "contact", "background", "arbitration", "map", "force"};
 
+// Bit of TickResult::contacts that all objects from this index on share.
+inline constexpr std::size_t kLastContactBit = 31;
+
 struct TickResult {
   glm::dvec3 device_m{0.0};  // scene frame, as used: the last valid input
   glm::dvec3 proxy_m{0.0};

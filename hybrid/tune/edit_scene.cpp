@@ -27,10 +27,9 @@ std::vector<Wanted> wanted_of(const TunableObject& object, const ObjectSetting& 
   return wanted;
 }
 
-// Sets the keys of one object. Returns false if the text cannot be edited.
-bool set_object(SceneTextEditor& editor, const std::string& object, const std::vector<Wanted>& wanted,
-                const std::string& comment) {
-  const TextTable table{"soft", object};
+// Sets keys of one table. Returns false if the text cannot be edited.
+bool set_keys(SceneTextEditor& editor, const TextTable& table, const std::vector<Wanted>& wanted,
+              const std::string& comment) {
   std::vector<std::string> keys;
   for (const Wanted& w : wanted) {
     if (!editor.set(table, w.key, w.value).empty()) return false;
@@ -46,13 +45,15 @@ std::string edited_scene(std::string_view text, const std::filesystem::path& fil
                          const std::string& reason, std::string_view mark) {
   SceneTextEditor editor{std::string(text), file};
   bool good = true, any = false;
-  for (std::size_t n = 0; n < objects.size() && good; ++n) {
-    const std::vector<Wanted> wanted = wanted_of(objects[n], setting.objects.at(n));
-    if (wanted.empty()) continue;
+  const auto set = [&](const TextTable& table, const std::vector<Wanted>& wanted) {
+    if (wanted.empty() || !good) return;
     if (!any) editor.remove_comments(mark);  // the new reasons replace those of an earlier choice
     any = true;
-    good = set_object(editor, objects[n].own.object, wanted, std::string(mark) + reason);
-  }
+    good = set_keys(editor, table, wanted, std::string(mark) + reason);
+  };
+  for (std::size_t n = 0; n < objects.size(); ++n)
+    set({"soft", objects[n].own.object}, wanted_of(objects[n], setting.objects.at(n)));
+  if (setting.coupling_N_per_m) set({"tool"}, {{"stiffness", coupling_text(*setting.coupling_N_per_m)}});
   if (good) return editor.text();
   throw std::runtime_error(
       fmt::format("{}: its text cannot be edited safely; write these lines yourself:\n{}", file.string(),

@@ -15,11 +15,11 @@ namespace hybrid {
 // A line with the reason begins with this mark. Lines that already begin with it are replaced.
 inline constexpr std::string_view kReasonMark = "# hybrid tune: ";
 
-// Returns the text of a scene file with the setting in it. A comment above each object that changed gives
-// `reason`, which is one sentence, behind `mark`. Values that do not differ from the scene's keep their text.
-// The result has been parsed again: it has the values of the setting, and all other values are as before.
-// `file` is used only in messages. Throws SceneError: the text is no scene. Throws std::runtime_error with
-// the lines to write by hand: the text cannot be edited.
+// Returns the text of a scene file with the setting in it. A comment above the keys of each table that
+// changed gives `reason`, which is one sentence, behind `mark`. Values that do not differ from the scene's
+// keep their text. The result has been parsed again: it has the values of the setting, and all other values
+// are as before. `file` is used only in messages. Throws SceneError: the text is no scene. Throws
+// std::runtime_error with the lines to write by hand: the text cannot be edited.
 std::string edited_scene(std::string_view text, const std::filesystem::path& file,
                          const std::vector<TunableObject>& objects, const Setting& setting,
                          const std::string& reason, std::string_view mark = kReasonMark);

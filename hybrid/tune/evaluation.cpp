@@ -15,16 +15,27 @@ FeltError felt_from(const nlohmann::json& j) {
           j.at(4).get<double>()};
 }
 
+// The course with every tick that has a force marked as felt, not only those with a soft object.
+ForceCourse felt_anywhere(ForceCourse course) {
+  for (CourseTick& tick : course) tick.soft = tick.force_N != glm::dvec3(0.0);
+  return course;
+}
+
 }  // namespace
 
-Evaluation evaluation_of(Played played, const ForceCourse& truth, double floor_N, double dt_s) {
-  Evaluation evaluation{.error = felt_error(played.course, truth, floor_N, dt_s),
-                        .tick_us = std::move(played.tick_us),
-                        .memory_bytes = played.memory_bytes,
-                        .soft_voxels = played.soft_voxels,
-                        .load_s = played.load_s,
-                        .faults = std::move(played.faults),
-                        .refused = {}};
+Evaluation evaluation_of(Played played, const ForceCourse& truth, double floor_N, double dt_s,
+                         bool other_coupling) {
+  const SettingError at_soft = felt_error(played.course, truth, floor_N, dt_s);
+  Evaluation evaluation{
+      .error = other_coupling ? felt_error(felt_anywhere(played.course), felt_anywhere(truth), floor_N, dt_s)
+                              : at_soft,
+      .at_soft = at_soft,
+      .tick_us = std::move(played.tick_us),
+      .memory_bytes = played.memory_bytes,
+      .soft_voxels = played.soft_voxels,
+      .load_s = played.load_s,
+      .faults = std::move(played.faults),
+      .refused = {}};
   std::vector<double> felt;
   for (std::size_t t = 0; t < std::min(evaluation.tick_us.size(), truth.size()); ++t) {
     if (truth[t].soft) felt.push_back(evaluation.tick_us[t]);
@@ -36,6 +47,7 @@ Evaluation evaluation_of(Played played, const ForceCourse& truth, double floor_N
 nlohmann::json to_json(const Evaluation& e) {
   return {{"moving", felt_json(e.error.moving)},
           {"still", felt_json(e.error.still)},
+          {"at_soft", {felt_json(e.at_soft.moving), felt_json(e.at_soft.still)}},
           {"tick_us", e.tick_us},
           {"felt_p99_us", e.felt_p99_us},
           {"memory_bytes", e.memory_bytes},
@@ -48,6 +60,7 @@ nlohmann::json to_json(const Evaluation& e) {
 Evaluation evaluation_from(const nlohmann::json& j) {
   Evaluation e;
   e.error = {felt_from(j.at("moving")), felt_from(j.at("still"))};
+  e.at_soft = {felt_from(j.at("at_soft").at(0)), felt_from(j.at("at_soft").at(1))};
   j.at("tick_us").get_to(e.tick_us);
   j.at("felt_p99_us").get_to(e.felt_p99_us);
   j.at("memory_bytes").get_to(e.memory_bytes);

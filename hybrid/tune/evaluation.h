@@ -13,7 +13,9 @@
 namespace hybrid {
 
 struct Evaluation {
-  SettingError error;
+  // error: over the ticks in which something soft is felt. With another coupling it is over all ticks with a
+  // force, and at_soft over those in which something soft is felt.
+  SettingError error, at_soft;
   std::vector<double> tick_us;
   double felt_p99_us = 0.0;  // p99 over the ticks in which the truth feels something soft
   std::uint64_t memory_bytes = 0, soft_voxels = 0;
@@ -22,7 +24,10 @@ struct Evaluation {
   std::string refused;  // why the setting cannot be built; empty if it can be built
 };
 
-Evaluation evaluation_of(Played played, const ForceCourse& truth, double floor_N, double dt_s);
+// `other_coupling`: the session had another coupling than the truth, which changes the force at rigid
+// objects, too.
+Evaluation evaluation_of(Played played, const ForceCourse& truth, double floor_N, double dt_s,
+                         bool other_coupling);
 
 nlohmann::json to_json(const Evaluation& evaluation);
 Evaluation evaluation_from(const nlohmann::json& j);

@@ -8,13 +8,12 @@
 #include "hybrid/compare/compare_scenes.h"
 #include "hybrid/session/equilibrium.h"
 #include "hybrid/session/report.h"
+#include "hybrid/tick/tick.h"
 
 namespace hybrid {
 namespace {
 
 constexpr double kAfterMotion_s = 0.5;  // a session goes on after its path, so that tissue comes to rest
-// Bit of TraceRow::contacts that all objects from this index on share.
-constexpr std::size_t kLastContactBit = 31;
 
 // The contact bits of the named objects. In a given world some of them are soft and others rigid.
 std::uint32_t contact_bits(const World& world, const std::vector<std::string>& objects) {
@@ -105,15 +104,19 @@ ForceCourse play_slowly(const Scene& scene, const std::vector<std::string>& obje
   ForceCourse course = course_of(*built.world, result.rows, contact_bits(*built.world, objects));
   const ForceCourse as_played = course;
   begin_session(scene, *built.world, *begin, result.start_m);
-  (void)compare_with_slow_run(
-      *built.world, *begin, as_played,
-      {.dt_s = result.dt_s,
-       .floor_N = jnd_floor_N(scene),
-       .most = 1,
-       .async_relaxation = true,
-       .progress = progress,
-       .slower = slower,
-       .felt = [&course](std::size_t tick, const glm::dvec3& force_N) { course[tick].force_N = force_N; }});
+  (void)compare_with_slow_run(*built.world, *begin, as_played,
+                              {.dt_s = result.dt_s,
+                               .floor_N = jnd_floor_N(scene),
+                               .most = 1,
+                               .async_relaxation = true,
+                               .arrival = Arrival::at_once,
+                               .progress = progress,
+                               .slower = slower,
+                               .own_contact = true,
+                               .felt = [&course](std::size_t tick, const glm::dvec3& force_N, bool soft) {
+                                 course[tick].force_N = force_N;
+                                 course[tick].soft = soft;
+                               }});
   device::stop_if_asked();
   return course;
 }

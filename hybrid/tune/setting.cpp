@@ -19,8 +19,8 @@ namespace {
 // Along an edge of a formula, so that one layer can be held and one can move.
 constexpr double kFewestVoxels = 2.0;
 
-double rounded(double value) {
-  return std::strtod(with_digits(value, kSpacingDigits).c_str(), nullptr);
+double rounded(double value, int digits = kSpacingDigits) {
+  return std::strtod(with_digits(value, digits).c_str(), nullptr);
 }
 glm::dvec3 rounded(const glm::dvec3& v) {
   return {rounded(v.x), rounded(v.y), rounded(v.z)};
@@ -124,6 +124,10 @@ std::string spacing_text(const glm::dvec3& spacing) {
   return fmt::format("[{}, {}, {}]", number(spacing.x), number(spacing.y), number(spacing.z));
 }
 
+std::string coupling_text(double stiffness_N_per_m) {
+  return with_digits(stiffness_N_per_m, kCouplingDigits);
+}
+
 std::vector<TunableObject> tunable_objects(const Scene& as_read) {
   Scene decided = as_read;
   choose_models(decided);
@@ -146,6 +150,11 @@ std::vector<TunableObject> tunable_objects(const Scene& as_read) {
 Setting own_setting(const std::vector<TunableObject>& objects) {
   Setting setting;
   for (const TunableObject& object : objects) setting.objects.push_back(object.own);
+  return setting;
+}
+
+Setting with_coupling(Setting setting, double stiffness_N_per_m) {
+  setting.coupling_N_per_m = rounded(stiffness_N_per_m, kCouplingDigits);
   return setting;
 }
 
@@ -184,19 +193,21 @@ Scene with_setting(const Scene& as_read, const Setting& setting) {
     soft.energy = object->energy;
     if (object->spacing != glm::dvec3(0.0)) set_spacing_m(soft.source, object->spacing * scene.unit_m);
   }
+  if (setting.coupling_N_per_m) scene.tool.stiffness_N_per_m = *setting.coupling_N_per_m;
   choose_models(scene);
   return on_ideal_device(scene);
 }
 
-Scene as_reference(const Scene& as_read, const Setting& setting) {
+Scene as_reference(const Scene& as_read, const Setting& setting, int split) {
   Scene exact = as_read;
-  Setting voxels = setting;
+  Setting voxels{setting.objects};
   std::set<std::string> own_energy;
   for (SoftDescription& soft : exact.soft) {
     ObjectSetting* object = find(voxels, soft.name);
     if (object == nullptr) continue;
     object->proxy = false;
     soft.thinning.reset();
+    soft.split = split;
     if (yields(exact, soft)) continue;
     object->energy = Energy::trilinear;
     own_energy.insert(soft.material);
@@ -212,11 +223,14 @@ std::string in_words(const Setting& setting, double unit_m) {
   std::vector<std::string> parts;
   for (const ObjectSetting& object : setting.objects) parts.push_back(object_in_words(object, unit_m));
   if (parts.empty()) return "nothing to tune";
-  if (std::ranges::all_of(parts, [&](const std::string& part) { return part == parts.front(); }))
-    return parts.front();
   std::string text;
-  for (std::size_t n = 0; n < parts.size(); ++n)
-    text += (n > 0 ? ", " : "") + setting.objects[n].object + " " + parts[n];
+  if (std::ranges::all_of(parts, [&](const std::string& part) { return part == parts.front(); })) {
+    text = parts.front();
+  } else {
+    for (std::size_t n = 0; n < parts.size(); ++n)
+      text += (n > 0 ? ", " : "") + setting.objects[n].object + " " + parts[n];
+  }
+  if (setting.coupling_N_per_m) text += fmt::format(", {} N/m", coupling_text(*setting.coupling_N_per_m));
   return text;
 }
 
@@ -232,6 +246,8 @@ std::string as_toml(const Setting& setting) {
       text += fmt::format("spacing = {} # lengths in the scene's unit\n", spacing_text(object.spacing));
     text += fmt::format("energy = \"{}\"\nmodel = \"voxels\"\n", energy_name(object.energy));
   }
+  if (setting.coupling_N_per_m)
+    text += fmt::format("# of [tool]\nstiffness = {} # N/m\n", coupling_text(*setting.coupling_N_per_m));
   return text;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,11 +28,17 @@ struct ObjectSetting {
 
 struct Setting {
   std::vector<ObjectSetting> objects;  // in the order of the scene's soft objects that may be tuned
+  // Stiffness of the tool's coupling, with at most kCouplingDigits digits. It acts on all objects. Empty: as
+  // the scene has it.
+  std::optional<double> coupling_N_per_m{};
 
-  friend bool operator==(const Setting& a, const Setting& b) { return a.objects == b.objects; }
+  friend bool operator==(const Setting& a, const Setting& b) {
+    return a.objects == b.objects && a.coupling_N_per_m == b.coupling_N_per_m;
+  }
 };
 
-inline constexpr int kSpacingDigits = 7;  // significant digits of a spacing in the scene's file
+inline constexpr int kSpacingDigits = 7;   // significant digits of a spacing in the scene's file
+inline constexpr int kCouplingDigits = 4;  // of a coupling's stiffness: far finer than a hand can tell
 
 // A soft object that may be tuned, and the values that its table has now.
 struct TunableObject {
@@ -51,6 +58,9 @@ std::vector<TunableObject> tunable_objects(const Scene& as_read);
 
 Setting own_setting(const std::vector<TunableObject>& objects);
 
+// The setting with a coupling of this stiffness, rounded to kCouplingDigits digits.
+Setting with_coupling(Setting setting, double stiffness_N_per_m);
+
 // The setting of the object with voxels `scale` times as wide, but no finer than its source. A formula's
 // edges stay whole numbers of voxels, so that its surfaces stay in place. Scale 1 is the object's own
 // spacing.
@@ -61,16 +71,17 @@ double scale_of(const TunableObject& object, const ObjectSetting& setting);
 // The scene from read_scene() with these values, on an ideal device. All models are decided.
 Scene with_setting(const Scene& as_read, const Setting& setting);
 
-// The most accurate scene at this setting's spacing: voxels everywhere, no thinning, and trilinear energy
-// where the materials allow it.
-Scene as_reference(const Scene& as_read, const Setting& setting);
+// The most accurate scene at this setting's spacing: voxels everywhere, no thinning, the coupling as given,
+// and trilinear energy where the materials allow it. Each voxel is divided into split³ parts.
+Scene as_reference(const Scene& as_read, const Setting& setting, int split = 1);
 
 // For example "2.5 mm six-link". If several objects differ: "block 2.5 mm six-link, bone proxy".
 std::string in_words(const Setting& setting, double unit_m);
-// The lines of each object's table, as in a scene file.
+// The lines of each object's table and of the tool's, as in a scene file.
 std::string as_toml(const Setting& setting);
 // A spacing as the text of its key's value: one number, or a list of three.
 std::string spacing_text(const glm::dvec3& spacing);
+std::string coupling_text(double stiffness_N_per_m);
 const char* energy_name(Energy energy);
 
 }  // namespace hybrid

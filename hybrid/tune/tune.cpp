@@ -62,6 +62,7 @@ class Search {
     plan(settings);
     find_truth();
     try_settings(settings);
+    match_proxies();
     if (result_.objects.size() > 1) refine();
     time_survivors();
     choose();
@@ -84,18 +85,11 @@ class Search {
   }
 
   void plan(const std::vector<Setting>& settings) {
-    const double scale = truth_scale();
-    // Runs for the truth, for the truth of the confirming motion, and two for the truth's error.
-    progress_.plan(truth_weight(scale) + slow_weight(scale, kTruthSlower) / kOtherSpeed);
+    split_ = truth_split(as_read_, result_.objects, result_.notes);
+    // Runs for the truth and its error, and for the truth of the confirming motion.
+    progress_.plan(truth_weight(split_) + slow_weight(1.0 / split_, kTruthSlower) / kOtherSpeed);
     for (const Setting& setting : settings)
       progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
-  }
-
-  // Scale of the truth's spacing. It is greater than kTruthScale if there would be too many voxels.
-  double truth_scale() {
-    if (truth_scale_ > 0.0) return truth_scale_;
-    truth_scale_ = first_truth_scale(as_read_, result_.objects, result_.notes);
-    return truth_scale_;
   }
 
   void find_truth() {
@@ -116,11 +110,11 @@ class Search {
     }
   }
 
-  [[nodiscard]] TruthPlan truth_plan() {
+  [[nodiscard]] TruthPlan truth_plan() const {
     return {.as_read = as_read_,
             .objects = result_.objects,
             .names = names_,
-            .scale = truth_scale(),
+            .split = split_,
             .floor_N = result_.floor_N,
             .dt_s = dt_s()};
   }
@@ -140,7 +134,7 @@ class Search {
       }
       try {
         evaluation = evaluation_of(play_setting(with_setting(as_read_, setting), names_, motion, progress),
-                                   truth, result_.floor_N, dt_s());
+                                   truth, result_.floor_N, dt_s(), setting.coupling_N_per_m.has_value());
       } catch (const SceneError& error) {
         evaluation.refused = error.what();
       }
@@ -158,6 +152,9 @@ class Search {
       trial.tuned.setting = setting;
       trial.tuned.words = in_words(setting, result_.unit_m);
       trial.tuned.own = setting == own_setting(result_.objects);
+      for (const Fitted& fitted : matches_) {
+        if (setting.coupling_N_per_m == fitted.coupling_N_per_m) trial.tuned.match = fitted.match;
+      }
       take(trial, evaluate(setting, {motion_.path, part_ticks_}, "", result_.truth.course, 0));
       trials_.push_back(std::move(trial));
     }
@@ -176,6 +173,7 @@ class Search {
   static void take(Trial& trial, const Evaluation& evaluation) {
     TunedSetting& tuned = trial.tuned;
     tuned.error = evaluation.error;
+    tuned.at_soft = evaluation.at_soft;
     tuned.felt_p99_us = evaluation.felt_p99_us;
     tuned.memory_bytes = evaluation.memory_bytes;
     tuned.soft_voxels = evaluation.soft_voxels;
@@ -205,6 +203,43 @@ class Search {
                                    points[*better].error_jnd / std::max(points[p].error_jnd, 1e-9),
                                    points[*better].cost_us / std::max(points[p].cost_us, 1e-9));
     }
+  }
+
+  // For each object that may be rendered by the proxy, and that the tool touches then: tries the proxy with a
+  // coupling that fits the truth's force in the first contact with the object.
+  void match_proxies() {
+    std::vector<Setting> settings;
+    for (std::size_t n = 0; n < result_.objects.size(); ++n) {
+      if (!result_.objects[n].other_model) continue;
+      Setting one = own_setting(result_.objects), all = one;
+      one.objects[n].proxy = true;
+      for (std::size_t o = 0; o < all.objects.size(); ++o)
+        all.objects[o].proxy = all.objects[o].proxy || result_.objects[o].other_model;
+      const auto match = fitted(one, names_[n]);
+      if (!match) continue;
+      for (const Setting& rigid : {one, all}) {
+        Setting setting = with_coupling(rigid, match->stiffness_N_per_m);
+        if (std::ranges::find(settings, setting) != settings.end()) continue;
+        settings.push_back(std::move(setting));
+        matches_.push_back({*settings.back().coupling_N_per_m, *match});
+        progress_.plan(weight(settings.back()) * (kFirstShare + static_cast<double>(passes())));
+      }
+    }
+    try_settings(settings);
+  }
+
+  // The coupling with which the proxy of `object` is nearest to the truth. `setting` renders the object by
+  // the proxy, with the coupling as given. Empty: the tool does not touch the object, or feels nothing there.
+  std::optional<StiffnessMatch> fitted(const Setting& setting, const std::string& object) {
+    std::optional<StiffnessMatch> match;
+    step_("the proxy of " + object, weight(setting), [&](const Progress& progress) {
+      const Scene scene = with_setting(as_read_, setting);
+      const ForceCourse proxy = play_setting(scene, {object}, motion_, progress).course;
+      const auto contact = first_contact(proxy, result_.floor_N, dt_s());
+      if (!contact) return;
+      match = match_stiffness(result_.truth.course, proxy, scene.tool.stiffness_N_per_m, *contact, dt_s());
+    });
+    return match;
   }
 
   // With several objects: varies each of them by itself, from the common setting that would be chosen now.
@@ -308,7 +343,7 @@ class Search {
     Confirmation& confirmation = result_.confirmation;
     confirmation.motion = words;
     const ForceCourse truth =
-        slow_course(truth_plan(), result_.truth.setting, motion, words, kTruthSlower, cache_, step_);
+        slow_course(truth_plan(), result_.truth.grid, motion, words, kTruthSlower, cache_, step_);
     const auto felt = [](const ForceCourse& course) {
       return static_cast<double>(std::ranges::count_if(course, &CourseTick::soft));
     };
@@ -336,9 +371,14 @@ class Search {
   Scene own_;
   Motion motion_;
   std::vector<std::string> names_;
-  double truth_scale_ = 0.0;
+  int split_ = kTruthSplit;
   std::uint64_t part_ticks_ = 1;
   std::vector<Trial> trials_;
+  struct Fitted {
+    double coupling_N_per_m;
+    StiffnessMatch match;
+  };
+  std::vector<Fitted> matches_;
 };
 
 }  // namespace

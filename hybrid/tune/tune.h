@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/tune/felt_stiffness.h"
 #include "hybrid/tune/front.h"
 #include "hybrid/tune/truth.h"
 
@@ -24,10 +25,13 @@ struct TuneOptions {
 struct TunedSetting {
   Setting setting;
   std::string words;
-  bool own = false;            // true: the setting that the scene has
+  bool own = false;  // true: the setting that the scene has
+  // How the setting's coupling was fitted. Empty: the coupling is as given.
+  std::optional<StiffnessMatch> match{};
   std::string left_out;        // why it was not played to the end; empty if it was
   bool whole_session = false;  // played over the whole motion at least once
-  SettingError error;          // against the truth; if left out, perhaps over only a part of the motion
+  // Against the truth; if left out, perhaps over only a part of the motion. As in Evaluation.
+  SettingError error, at_soft;
   // Percentiles over the ticks. Each tick does the same work in every pass, so its time is the median over
   // the passes.
   Percentiles tick_us;

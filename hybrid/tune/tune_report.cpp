@@ -10,6 +10,7 @@
 #include "hybrid/base/table.h"
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/session/report.h"
+#include "hybrid/tune/truth_text.h"
 
 namespace hybrid {
 namespace {
@@ -25,11 +26,6 @@ PassRange range_of(const TunedSetting& setting) {
   if (setting.pass_p999_us.empty()) return {setting.tick_us.p999, setting.tick_us.p999};
   const auto [low, high] = std::ranges::minmax(setting.pass_p999_us);
   return {low, high};
-}
-
-std::string error_text(const SettingError& error) {
-  const auto one = [](const FeltError& e) { return e.ticks > 0 ? fmt::format("{:.2f}", e.p99_jnd) : "-"; };
-  return fmt::format("{} JND moving, {} still", one(error.moving), one(error.still));
 }
 
 const char* rule_name(ChoiceRule rule) {
@@ -103,6 +99,36 @@ std::string doubt_about_cost(const TuneResult& result) {
   return text;
 }
 
+bool voxels_left(const Setting& setting) {
+  return std::ranges::any_of(setting.objects, [](const ObjectSetting& one) { return !one.proxy; });
+}
+
+// Is a proxy enough? If not, how far off is the nearest one?
+std::string about_proxies(const TuneResult& result) {
+  const TunedSetting& chosen = result.settings[result.chosen];
+  if (chosen.match) {
+    return fmt::format(
+        "{} Its coupling is the tool's, so it is felt at every object. It fits depths up to {:.2f} mm, as on "
+        "this path.",
+        voxels_left(chosen.setting) ? "" : " A proxy is enough here: no voxels are needed.",
+        1e3 * chosen.match->depth_m);
+  }
+  if (!voxels_left(chosen.setting)) return " A proxy is enough here: no voxels are needed.";
+  const TunedSetting* nearest = nullptr;
+  for (const TunedSetting& s : result.settings) {
+    if (s.match && (nearest == nullptr || s.error.worst_jnd() < nearest->error.worst_jnd())) nearest = &s;
+  }
+  if (nearest == nullptr) return {};
+  const double everywhere = nearest->error.worst_jnd(), at_soft = nearest->at_soft.worst_jnd();
+  if (everywhere < result.bounds.error_jnd) return {};  // another rule decided
+  std::string text =
+      fmt::format(" A proxy is not enough here: {} is off by {:.2g} JND", nearest->words, at_soft);
+  if (everywhere > at_soft)
+    text +=
+        fmt::format(" at soft objects, and by {:.2g} JND where its coupling meets others, too", everywhere);
+  return text + ".";
+}
+
 std::string marked_words(const TunedSetting& s) {
   return s.words + (s.own ? " (as it is)" : "");
 }
@@ -170,18 +196,12 @@ std::string left_out_words(const TuneResult& result) {
 }
 
 std::string truth_in_words(const TuneResult& result) {
-  const Truth& truth = result.truth;
-  std::string text = fmt::format(
-      "errors: p99 of the difference from the truth in each tick in which something soft is felt, on an "
-      "ideal "
-      "device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n"
-      "truth: {}, played {} times slower; its own error, from voxels twice as wide: {}; from "
-      "twice the speed: {}\n",
-      100.0 * kJndShare, result.floor_N, truth.words, kTruthSlower, error_text(truth.spacing),
-      error_text(truth.rest));
-  if (std::max(truth.rest.moving.p99_jnd, truth.rest.still.p99_jnd) > 1.0)
-    text += "  the truth does not come to rest within 1 JND: played slower still, its force differs\n";
-  return text;
+  return fmt::format(
+             "errors: p99 of the difference from the truth in each tick in which something soft is felt, on "
+             "an "
+             "ideal device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n",
+             100.0 * kJndShare, result.floor_N) +
+         truth_words(result.truth);
 }
 
 std::string confirmation_words(const TuneResult& result) {
@@ -191,30 +211,20 @@ std::string confirmation_words(const TuneResult& result) {
   return fmt::format(
       "confirmed on a motion that was not used, {}: {} ({:.2g} times the error), tick p99.9 {:.0f} "
       "us ({:.2g} times)\n",
-      c.motion, error_text(c.error), now / std::max(before, 1e-9), c.tick_us.p999,
+      c.motion, in_words(c.error), now / std::max(before, 1e-9), c.tick_us.p999,
       c.tick_us.p999 / std::max(result.settings[result.chosen].tick_us.p999, 1e-9));
-}
-
-nlohmann::ordered_json felt_report(const FeltError& e) {
-  return {{"ticks", e.ticks},
-          {"jnd_p50", e.p50_jnd},
-          {"jnd_p99", e.p99_jnd},
-          {"jnd_max", e.max_jnd},
-          {"max_t_s", e.ticks > 0 ? nlohmann::ordered_json(e.max_t_s) : nlohmann::ordered_json(nullptr)}};
-}
-
-nlohmann::ordered_json error_report(const SettingError& error) {
-  return {{"moving", felt_report(error.moving)}, {"still", felt_report(error.still)}};
 }
 
 nlohmann::ordered_json setting_report(const TuneResult& result, std::size_t n) {
   const TunedSetting& s = result.settings[n];
   nlohmann::ordered_json row{{"name", s.words}, {"toml", as_toml(s.setting)}, {"as_it_is", s.own}};
+  row["match"] = s.match ? to_json(*s.match) : nlohmann::ordered_json(nullptr);
   row["on_front"] = std::ranges::find(result.front, n) != result.front.end();
   row["dominated_by"] = s.dominated_by ? nlohmann::ordered_json(result.settings[*s.dominated_by].words)
                                        : nlohmann::ordered_json(nullptr);
   row["left_out"] = s.whole() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(s.left_out);
-  row["error"] = error_report(s.error);
+  row["error"] = to_json(s.error);
+  row["error_at_soft"] = to_json(s.at_soft);
   row["tick_us"] = to_json(s.tick_us);
   row["pass_p999_us"] = s.pass_p999_us;
   row["memory_bytes"] = s.memory_bytes;
@@ -237,7 +247,7 @@ std::string tune_verdict(const TuneResult& result) {
   const TunedSetting& s = result.settings[result.chosen];
   const Bounds& b = result.bounds;
   const std::string what = fmt::format("{}{}: {} (p99), tick p99.9 {:.0f} us", s.words,
-                                       s.own ? " (as it is)" : "", error_text(s.error), s.tick_us.p999);
+                                       s.own ? " (as it is)" : "", in_words(s.error), s.tick_us.p999);
   std::string text;
   switch (result.choice.rule) {
     case ChoiceRule::cheapest_accurate:
@@ -262,15 +272,20 @@ std::string tune_verdict(const TuneResult& result) {
       break;
   }
   if (!result.choice.any_sound) text += " Every setting had a fault.";
-  return truth_warning(result) + text + doubt_about_error(result) + doubt_about_cost(result);
+  return truth_warning(result) + text + about_proxies(result) + doubt_about_error(result) +
+         doubt_about_cost(result);
 }
 
 std::string tune_reason(const TuneResult& result) {
   const TunedSetting& s = result.settings[result.chosen];
+  const std::string fitted =
+      s.match ? fmt::format("; its coupling fits the truth's force up to {:.2f} mm deep, {:.2f} N",
+                            1e3 * s.match->depth_m, s.match->force_N)
+              : "";
   return fmt::format(
-      "{}: {} (p99, the truth uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, {:.0f} us).",
-      s.words, error_text(s.error), result.truth.error_jnd(), s.tick_us.p999, rule_name(result.choice.rule),
-      result.bounds.error_jnd, result.bounds.budget_us);
+      "{}: {} (p99, the truth uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, {:.0f} us){}.",
+      s.words, in_words(s.error), result.truth.error_jnd(), s.tick_us.p999, rule_name(result.choice.rule),
+      result.bounds.error_jnd, result.bounds.budget_us, fitted);
 }
 
 std::string tune_words(const TuneResult& result) {
@@ -290,11 +305,7 @@ nlohmann::ordered_json tune_json(const TuneResult& result) {
                  {"budget_us", result.bounds.budget_us},
                  {"period_us", result.period_us}};
   j["jnd"] = {{"share", kJndShare}, {"floor_N", result.floor_N}};
-  j["truth"] = {{"setting", result.truth.words},
-                {"slower", kTruthSlower},
-                {"spacing_error", error_report(result.truth.spacing)},
-                {"rest_error", error_report(result.truth.rest)},
-                {"error_jnd", result.truth.error_jnd()}};
+  j["truth"] = to_json(result.truth);
   j["chosen"] = result.settings[result.chosen].words;
   j["rule"] = rule_name(result.choice.rule);
   j["front"] = nlohmann::ordered_json::array();
@@ -303,8 +314,7 @@ nlohmann::ordered_json tune_json(const TuneResult& result) {
   for (std::size_t n = 0; n < result.settings.size(); ++n) j["settings"].push_back(setting_report(result, n));
   const Confirmation& c = result.confirmation;
   if (c.not_done.empty()) {
-    j["confirmation"] = {
-        {"motion", c.motion}, {"error", error_report(c.error)}, {"tick_us", to_json(c.tick_us)}};
+    j["confirmation"] = {{"motion", c.motion}, {"error", to_json(c.error)}, {"tick_us", to_json(c.tick_us)}};
   } else {
     j["confirmation"] = {{"not_done", c.not_done}};
   }

@@ -127,6 +127,47 @@ constexpr std::array kThreadsKeys{
     ReportKey{"relaxation_share", measured},
 };
 
+constexpr std::array kScenesKeys{
+    ReportKey{"scene", identity},
+    ReportKey{"model", identity},
+    ReportKey{"values", detail},
+    ReportKey{"repeats", context},
+    ReportKey{"reference", context},
+    ReportKey{"noisy", context},
+    ReportKey{"p99_ratio_sure", context},
+    ReportKey{"left_out", context},
+    ReportKey{"faults", exact, "ticks"},
+    ReportKey{"force_error_jnd", exact, "ticks"},
+    ReportKey{"force_error_p99_jnd", exact, "ticks"},
+    ReportKey{"force_error_N", exact, "ticks"},
+    ReportKey{"from_given.moving.jnd_p50", exact, "ticks"},
+    ReportKey{"from_given.moving.jnd_p99", exact, "ticks"},
+    ReportKey{"from_given.moving.jnd_max", exact, "ticks"},
+    ReportKey{"from_given.moving.ticks", exact, "ticks"},
+    ReportKey{"from_given.still.jnd_p50", exact, "ticks"},
+    ReportKey{"from_given.still.jnd_p99", exact, "ticks"},
+    ReportKey{"from_given.still.jnd_max", exact, "ticks"},
+    ReportKey{"from_given.still.ticks", exact, "ticks"},
+    ReportKey{"ticks"},
+    ReportKey{"contact_ticks", exact, "ticks"},
+    ReportKey{"soft_voxels"},
+    ReportKey{"memory_bytes", measured},  // hierarchies are built by several threads
+    ReportKey{"p50_us.median", measured},
+    ReportKey{"p50_us.least", measured},
+    ReportKey{"p50_us.most", measured},
+    ReportKey{"p99_us.median", measured},
+    ReportKey{"p99_us.least", measured},
+    ReportKey{"p99_us.most", measured},
+    ReportKey{"p999_us.median", measured},
+    ReportKey{"p999_us.least", measured},
+    ReportKey{"p999_us.most", measured},
+    ReportKey{"max_us.median", measured},
+    ReportKey{"max_us.least", measured},
+    ReportKey{"max_us.most", measured},
+    ReportKey{"p99_ratio", measured},
+    ReportKey{"load_s", measured},
+};
+
 }  // namespace
 
 std::span<const ReportKey> keys_of(std::string_view suite) {
@@ -134,6 +175,7 @@ std::span<const ReportKey> keys_of(std::string_view suite) {
   if (suite == "soft") return kSoftKeys;
   if (suite == "occupancy") return kOccupancyKeys;
   if (suite == "threads") return kThreadsKeys;
+  if (suite == "scenes") return kScenesKeys;
   return {};
 }
 

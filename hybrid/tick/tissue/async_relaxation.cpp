@@ -26,6 +26,8 @@ constexpr int kMaxWaits = 3;
 constexpr std::uint64_t kRowsRelaxed = 400;
 // Ticks between a result and the next submission, in which the contact sees the full residual.
 constexpr std::uint64_t kTicksBetween = 3;
+// The same with Arrival::at_once. Then each result costs a cycle over the whole object, at any spacing.
+constexpr std::uint64_t kTicksBetweenAtOnce = 50;
 
 bool has_arrived(const AsyncRelaxation& async, const AsyncObject& object, std::size_t o,
                  std::uint64_t tick) noexcept {
@@ -36,6 +38,7 @@ bool has_arrived(const AsyncRelaxation& async, const AsyncObject& object, std::s
       return object.phase.load(std::memory_order_acquire) == AsyncObject::Phase::tick;
     case Arrival::recorded:
     case Arrival::played:
+    case Arrival::at_once:
       break;
   }
   return (async.arrived >> o & 1U) != 0;
@@ -52,6 +55,23 @@ void submit(WorldState& state, AsyncObject& object, std::size_t o) noexcept {
   object.shadow.relax();
   state.async.other_thread_us += 1e6 * (thread_time_s() - before_s);
   object.due = state.tick + 1 + object.shadow.work() / kRowsRelaxed;
+}
+
+// A result in real time is late by the work of its cycle, which grows with the number of voxels. A reference
+// that has its results as late comes the less to rest the finer its lattice is.
+void exchange_at_once(WorldState& state, std::size_t o) noexcept {
+  AsyncObject& object = *state.async.objects[o];
+  voxel::SoftObject& soft = *state.soft[o];
+  if (state.tick < object.next || !voxel::ShadowObject::wanted(soft)) return;
+  while (soft.prepare_exchange()) {
+  }
+  submit(state, object, o);
+  object.shadow.apply_near(soft);
+  while (!object.shadow.all_applied()) object.shadow.apply_far(soft, kMaxRowsApplied);
+  object.submitted = false;
+  object.next = state.tick + kTicksBetweenAtOnce;
+  ++state.async.results;
+  state.async.applied = true;
 }
 
 // Makes at most one of these exchanges in the tick: a part of a result, the preparation of an exchange, a
@@ -141,7 +161,11 @@ void relax_background(const World& world, WorldState& state) noexcept {
       state.soft[o]->relax_background(world.soft[o].budget);
     } else {
       state.soft[o]->relax_near_pairs();
-      exchange(state, o, arrived);
+      if (state.async.arrival == Arrival::at_once) {
+        exchange_at_once(state, o);
+      } else {
+        exchange(state, o, arrived);
+      }
     }
   }
   const bool said = state.async.arrival == Arrival::recorded || state.async.arrival == Arrival::played;

@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 
 #include "hybrid/compare/compare.h"
 #include "hybrid/feel/just_noticeable.h"
 #include "hybrid/models/models_text.h"
 #include "hybrid/models/variants.h"
+#include "hybrid/tune/edit_scene.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 
 namespace {
@@ -83,6 +85,20 @@ TEST_F(Models, OfASoftBlock) {
   EXPECT_EQ(json.at("objects").at(0).at("models").size(), block.rows.size());
   EXPECT_FALSE(hybrid::to_svg(hybrid::models_figure(models, "gel")).empty());
 
+  // The tables fit into 100 columns, and have each figure of the row.
+  std::istringstream lines(hybrid::models_words(models));
+  std::size_t of_given = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const bool in_table = std::ranges::any_of(block.rows, [&](const ModelRow& r) {
+      return line.starts_with(r.name + " ") && line.find(": ") == std::string::npos;
+    });
+    if (in_table) {
+      EXPECT_LE(line.size(), 100U) << line;
+    }
+    of_given += line.starts_with("as given ") ? 1 : 0;
+  }
+  EXPECT_EQ(of_given, 2U);
+
   // Each variant that is written reads as the scene that was played, and keeps the comments.
   std::ifstream in(scene.file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
@@ -90,7 +106,7 @@ TEST_F(Models, OfASoftBlock) {
     if (!r.left_out.empty() || r.name == hybrid::kAsGiven) continue;
     ASSERT_TRUE(r.setting) << r.name;
     const std::string edited =
-        hybrid::variant_text(text, scene.file, models.tunable, *r.setting, r.coupling_N_per_m, "why");
+        hybrid::edited_scene(text, scene.file, models.tunable, *r.setting, "why", hybrid::kVariantMark);
     EXPECT_THAT(edited, HasSubstr("# the tool\n"));
     EXPECT_THAT(edited, HasSubstr("# of gel\n"));
     EXPECT_THAT(edited, HasSubstr("# hybrid compare: why\n"));

@@ -5,10 +5,13 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "device/loop/stop_signal.h"
+#include "hybrid/build/build_objects.h"
 #include "hybrid/compare/compare.h"
 #include "hybrid/compare/compare_scenes.h"
 #include "hybrid/tune/edit_scene.h"
@@ -55,7 +58,7 @@ TEST_F(Tune, AnErrorIsWhatCompareSaysOfTheTwoFiles) {
 }
 
 TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
-  const Scene scene = hybrid::on_ideal_device(hybrid::load_scene(gel("a.toml", "2")));
+  Scene scene = hybrid::on_ideal_device(hybrid::load_scene(gel("a.toml", "2")));
   const Motion motion = hybrid::scene_motion(scene);
   const auto slow = [&](int slower) { return hybrid::play_slowly(scene, kBlock, motion, slower, {}); };
   const auto error = [&](const auto& x, const auto& y) { return hybrid::felt_error(x, y, 0.04, 1e-3); };
@@ -65,9 +68,59 @@ TEST_F(Tune, TheTruthAgainstItselfHasNoError) {
   EXPECT_GT(itself.still.ticks, 50U);
   EXPECT_EQ(itself.moving.max_jnd, 0.0);
   EXPECT_EQ(itself.still.max_jnd, 0.0);
-  // With a slow-down factor of 1, the truth is the session itself. The block is too small for patches, which
-  // a slow run would widen.
+  // With a slow-down factor of 1, the truth of tissue that relaxes in the tick is the session itself. Tissue
+  // that yields does. The block is too small for patches, which a slow run would widen.
+  scene.materials.at("gel").yield = 0.4;
   EXPECT_EQ(error(slow(1), hybrid::play_setting(scene, kBlock, motion, {}).course).worst_jnd(), 0.0);
+}
+
+// A divided voxel is the same body, so surfaces, materials and anchors stay in place.
+TEST_F(Tune, ATruthHasTheScenesOwnShape) {
+  const Scene scene =
+      hybrid::read_scene(write("ball.toml",
+                               "format = 1\n[material.gel]\nyoung = 8000\n[[soft]]\nname = \"ball\"\n"
+                               "formula = \"ball\"\nsize = 20\nspacing = 3\nposition = [1, 2, 3]\n" +
+                                   tests::path));
+  const auto objects = hybrid::tunable_objects(scene);
+  const auto volume = [&](int split) {
+    std::vector<hybrid::BuildNote> notes;
+    return hybrid::build_volume(hybrid::as_reference(scene, hybrid::own_setting(objects), split).soft.front(),
+                                notes);
+  };
+  const auto own = volume(1), divided = volume(2);
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto axis = static_cast<int>(d);
+    ASSERT_EQ(divided.dims[d], 2 * own.dims[d]);
+    EXPECT_DOUBLE_EQ(divided.spacing_m[axis], 0.5 * own.spacing_m[axis]);
+    EXPECT_NEAR(divided.origin_m[axis] - 0.5 * divided.spacing_m[axis],
+                own.origin_m[axis] - 0.5 * own.spacing_m[axis], 1e-12);
+  }
+  for (int k = 0; k < divided.dims[2]; ++k) {
+    for (int j = 0; j < divided.dims[1]; ++j) {
+      for (int i = 0; i < divided.dims[0]; ++i)
+        ASSERT_EQ(divided.labels[divided.index(i, j, k)], own.labels[own.index(i / 2, j / 2, k / 2)]);
+    }
+  }
+}
+
+// Results of relaxation are not late in a truth. So divided voxels come to rest as soon as undivided ones:
+// the force hardly depends on how slowly the truth is played.
+TEST_F(Tune, ATruthIsAtRestOnDividedVoxels) {
+  const Scene scene = hybrid::read_scene(
+      write("big.toml",
+            "format = 1\n[tool]\nradius = 5\nstiffness = 800\n[material.gel]\nyoung = 8000\n"
+            "[[rigid]]\nname = \"near\"\nprimitive = \"box\"\nsize = [4, 4, 4]\nposition = [30, 0, 0]\n"
+            "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [48, 48, 24]\nspacing = 2\n"
+            "material = \"gel\"\n[path]\nkind = \"press\"\nfrom = [0, 0, 20]\nto = [0, 0, 13]\n"
+            "hold = 0.2\nspeed = 60\n"));
+  const auto objects = hybrid::tunable_objects(scene);
+  const Scene fine = hybrid::as_reference(scene, hybrid::own_setting(objects), 2);
+  const Motion motion = hybrid::scene_motion(fine);
+  const auto slow = [&](int slower) { return hybrid::play_slowly(fine, kBlock, motion, slower, {}); };
+  const auto error = hybrid::felt_error(slow(10), slow(20), 0.04, 1e-3);
+  EXPECT_GT(error.still.ticks, 100U);
+  EXPECT_LT(error.still.p50_jnd, 0.05);
+  EXPECT_LT(error.worst_jnd(), 0.5);
 }
 
 void expect_equal(const TuneResult& a, const TuneResult& b, bool times) {
@@ -163,6 +216,55 @@ TEST_F(Tune, AVerdictSaysFirstThatTheTruthIsTooUncertainForIt) {
   EXPECT_THAT(hybrid::tune_verdict(one_setting(4.8, 0.5)),
               testing::StartsWith("The truth is itself uncertain by 4.80 JND, so no setting is shown"));
   EXPECT_THAT(hybrid::tune_verdict(one_setting(0.2, 1.9)), HasSubstr("off by 1.90 JND, more than the bound"));
+}
+
+// A shallow press into soft gel, and then, if `rigid`, one onto a rigid box beside it.
+std::string gel_and_box(bool rigid) {
+  std::string text =
+      "format = 1\n[tool] # the tool\nradius = 4\nstiffness = 1500\n[material.gel]\nyoung = 12000\n[[soft]]\n"
+      "name = \"block\"\nformula = \"block\"\nsize = [24, 24, 10]\nspacing = 2\nmaterial = \"gel\"\n";
+  if (rigid)
+    text += "[[rigid]]\nname = \"box\"\nprimitive = \"box\"\nsize = [20, 20, 10]\nposition = [40, 0, 0]\n";
+  text += "[path]\nkind = \"waypoints\"\nspeed = 30\npoints = [[0, 0, 10], [0, 0, 7.2, 0.1], [0, 0, 10]";
+  if (rigid) text += ", [40, 0, 10], [40, 0, 8.5, 0.1], [40, 0, 10]";
+  return text + "]\n";
+}
+
+TEST_F(Tune, AProxyWithAFittedCouplingIsChosenWhereItIsEnough) {
+  const auto file = write("gel.toml", gel_and_box(false));
+  const Scene scene = hybrid::read_scene(file);
+  const TuneResult result = hybrid::tune(scene, {.quick = true, .cache = {}, .progress = {}});
+  const hybrid::TunedSetting& chosen = result.settings[result.chosen];
+  ASSERT_TRUE(chosen.match) << chosen.words;
+  EXPECT_TRUE(chosen.setting.objects[0].proxy);
+  EXPECT_NEAR(*chosen.setting.coupling_N_per_m, chosen.match->stiffness_N_per_m,
+              1e-3 * chosen.match->stiffness_N_per_m);
+  EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("A proxy is enough here"));
+  EXPECT_THAT(hybrid::tune_reason(result), HasSubstr("its coupling fits the truth's force up to"));
+
+  // The scene that is written is felt as the setting was.
+  std::ifstream in(file);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const std::string edited = hybrid::edited_scene(text, file, result.objects, chosen.setting, "why");
+  EXPECT_THAT(edited, HasSubstr("[tool] # the tool\n"));
+  EXPECT_THAT(edited, HasSubstr("model = \"proxy\""));
+  EXPECT_THAT(edited, HasSubstr("# hybrid tune: why\nstiffness = "));
+  const Scene written = hybrid::on_ideal_device(hybrid::load_scene(write("written.toml", edited)));
+  const auto played = hybrid::play_setting(written, kBlock, hybrid::scene_motion(written), {}).course;
+  const auto error = hybrid::felt_error(played, result.truth.course, result.floor_N, 1.0 / scene.rate_hz);
+  EXPECT_NEAR(error.worst_jnd(), chosen.error.worst_jnd(), 1e-9);
+}
+
+TEST_F(Tune, AFittedCouplingIsJudgedAtTheRigidObjectsToo) {
+  const Scene scene = hybrid::read_scene(write("both.toml", gel_and_box(true)));
+  const TuneResult result = hybrid::tune(scene, {.quick = true, .cache = {}, .progress = {}});
+  const auto fitted =
+      std::ranges::find_if(result.settings, [](const auto& s) { return s.match.has_value(); });
+  ASSERT_NE(fitted, result.settings.end());
+  EXPECT_LT(fitted->at_soft.worst_jnd(), 1.0);
+  EXPECT_GT(fitted->error.worst_jnd(), 5.0);
+  EXPECT_FALSE(result.settings[result.chosen].match);
+  EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("where its coupling meets others, too"));
 }
 
 TEST_F(Tune, APathThatTouchesNothingSoftIsRefused) {

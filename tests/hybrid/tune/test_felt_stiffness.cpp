@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // First contact, felt stiffness and fitted coupling against forces whose law is known.
-#include "hybrid/models/felt_stiffness.h"
+#include "hybrid/tune/felt_stiffness.h"
 
 #include <gtest/gtest.h>
 

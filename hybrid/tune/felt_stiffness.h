@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
@@ -45,5 +46,7 @@ struct StiffnessMatch {
 // contact, or the forces point away from each other.
 std::optional<StiffnessMatch> match_stiffness(const ForceCourse& reference, const ForceCourse& proxy,
                                               double own_N_per_m, const TickRange& contact, double dt_s);
+
+nlohmann::ordered_json to_json(const StiffnessMatch& match);
 
 }  // namespace hybrid

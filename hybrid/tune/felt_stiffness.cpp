@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/models/felt_stiffness.h"
+#include "hybrid/tune/felt_stiffness.h"
 
 #include <algorithm>
 #include <cmath>
@@ -72,6 +72,16 @@ std::optional<StiffnessMatch> match_stiffness(const ForceCourse& reference, cons
   }
   match.rms_N = std::sqrt(left / static_cast<double>(end - contact.begin));
   return match;
+}
+
+nlohmann::ordered_json to_json(const StiffnessMatch& match) {
+  return {{"stiffness_N_per_m", match.stiffness_N_per_m},
+          {"rms_N", match.rms_N},
+          {"max_N", match.max_N},
+          {"depth_m", match.depth_m},
+          {"force_N", match.force_N},
+          {"from_s", match.from_s},
+          {"to_s", match.to_s}};
 }
 
 }  // namespace hybrid
