@@ -27,13 +27,21 @@ FramePainter::FramePainter(const DrawnScene& scene, Samples samples, int height)
     : scene_(scene),
       tissue_(scene, bounds_of(scene).centre_m),
       renderer_(scene, samples),
-      overlay_(height),
       box_(soft_box(scene)) {
-  renderer_.set_font(overlay_.font());
+  choose_fonts(height);
   if (samples == Samples::fast && draws_in_software()) keep_freed_memory();
 }
 
+// The text follows the size of the frame. New fonts need a new overlay.
+void FramePainter::choose_fonts(int height) {
+  if (text_height(height) == em_) return;
+  em_ = text_height(height);
+  overlay_.emplace(height);
+  renderer_.set_font(overlay_->font());
+}
+
 void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options) {
+  choose_fonts(options.height);
   renderer_.set_view(options.view);
   tissue_.set(options.view);
   tissue_.take(snapshot);
@@ -66,7 +74,7 @@ void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const F
       content.inset = OverlayContent::Inset{near, nearer};
     }
   }
-  renderer_.finish(overlay_.build(scene_, snapshot, content));
+  renderer_.finish(overlay_->build(scene_, snapshot, content));
 }
 
 }  // namespace hybrid

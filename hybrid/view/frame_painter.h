@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
@@ -44,7 +45,10 @@ class FramePainter {
   const DrawnScene& scene_;
   TissueView tissue_;
   Renderer renderer_;
-  Overlay overlay_;
+  void choose_fonts(int height);
+
+  std::optional<Overlay> overlay_;
+  float em_ = 0.0F;  // height of the overlay's body text (pixels)
   SoftBox box_;
 };
 

@@ -349,7 +349,7 @@ void GlOverlay::create() {
 
 void GlOverlay::set_font(const FontAtlas& atlas) {
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glGenTextures(1, &font_);
+  if (font_ == 0) glGenTextures(1, &font_);
   glBindTexture(GL_TEXTURE_2D, font_);
   glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, atlas.width, atlas.height, 0, GL_RED, GL_UNSIGNED_BYTE,
                atlas.alpha.data());
