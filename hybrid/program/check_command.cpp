@@ -132,8 +132,9 @@ void check_volume_file(const std::filesystem::path& path, Json& file) {
   file["spacing_m"] = {h.spacing_m.x, h.spacing_m.y, h.spacing_m.z};
   const voxel::VolumeStatistics s = voxel::read_volume_statistics(path, usable_memory_bytes() / 4);
   if (s.not_numbers > 0) {
-    add_finding(file, {"V02", polygon::Severity::warning, s.not_numbers,
-                       "voxels are not numbers (NaN): they are in no range, and count as empty"});
+    file["findings"].push_back(
+        counted({"V02", polygon::Severity::warning, s.not_numbers,
+                 "voxels are not numbers (NaN): they are in no range, and count as empty"}));
   }
   file["minimum"] = s.minimum;
   file["maximum"] = s.maximum;
