@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
@@ -51,7 +52,24 @@ std::string unused_name() {
   return ".hybrid-" + std::string(std::as_const(text).data(), end) + ".part";
 }
 
+// Temporary names that are, or are about to be, in a folder. A signal handler reads them.
+constexpr std::size_t kMostNames = 16;  // more files at a time are left if a signal ends the process
+std::array<std::atomic<const char*>, kMostNames> names_in_folders{};
+
+void replace_name(const char* from, const char* to) noexcept {
+  for (auto& place : names_in_folders) {
+    const char* expected = from;
+    if (place.compare_exchange_strong(expected, to)) return;
+  }
+}
+
 }  // namespace
+
+void remove_unfinished_files() noexcept {
+  for (const auto& place : names_in_folders) {
+    if (const char* const name = place.load()) ::unlink(name);
+  }
+}
 
 FilePlace::FilePlace(const fs::path& file) : asked(file) {
   fs::path path = file;
@@ -81,6 +99,15 @@ FilePlace::FilePlace(const fs::path& file) : asked(file) {
 FileOnItsWay::~FileOnItsWay() {
   if (descriptor_ >= 0) ::close(descriptor_);
   if (named_ && !left_beside_) ::unlink(place_.temporary.c_str());
+  forget_name();
+}
+
+void FileOnItsWay::note_name() noexcept {
+  replace_name(nullptr, place_.temporary.c_str());
+}
+
+void FileOnItsWay::forget_name() noexcept {
+  replace_name(place_.temporary.c_str(), nullptr);
 }
 
 bool FileOnItsWay::open() noexcept {
@@ -101,6 +128,7 @@ bool FileOnItsWay::open() noexcept {
   if (::access(kOpenFiles.data(), X_OK) == 0)
     descriptor_ = ::open(place_.folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, kMode);
   if (descriptor_ < 0) {
+    note_name();
     descriptor_ = ::open(place_.temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
     named_ = descriptor_ >= 0;
   }
@@ -123,6 +151,7 @@ bool FileOnItsWay::keep() noexcept {
     std::array<char, 32> name{};
     kOpenFiles.copy(name.data(), kOpenFiles.size());
     std::to_chars(name.data() + kOpenFiles.size(), name.data() + name.size() - 1, descriptor_);
+    note_name();
     if (::linkat(AT_FDCWD, name.data(), AT_FDCWD, place_.temporary.c_str(), AT_SYMLINK_FOLLOW) != 0)
       return false;
     named_ = true;
@@ -132,9 +161,11 @@ bool FileOnItsWay::keep() noexcept {
   if (closed != 0) return false;
   if (::rename(place_.temporary.c_str(), place_.target.c_str()) != 0) {
     left_beside_ = true;
+    forget_name();
     return false;
   }
   named_ = false;
+  forget_name();
   // Writes the new name to the disk too. Some file systems cannot do this; the file is there without it.
   const int folder = ::open(place_.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder >= 0) {

@@ -44,10 +44,16 @@ class FileOnItsWay {
   [[nodiscard]] bool left_beside() const noexcept { return left_beside_; }
 
  private:
+  void note_name() noexcept;
+  void forget_name() noexcept;
+
   const FilePlace& place_;
   int descriptor_ = -1;
   bool named_ = false, left_beside_ = false;
 };
+
+// Removes the temporary names of all files on their way. For a signal handler that ends the process.
+void remove_unfinished_files() noexcept;
 
 // A whole file with a stream. Each member throws std::runtime_error with file, reason and remedy.
 class WholeFile {

@@ -19,6 +19,7 @@ void write_words(std::string_view text) noexcept {
 }
 
 extern "C" void hybrid_end_at_once(int signal) {
+  remove_unfinished_files();
   write_words("\nended at once by ");
   write_words(signal_in_words(signal));
   write_words("; no file is left half written\n");
