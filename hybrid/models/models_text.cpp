@@ -68,7 +68,8 @@ std::string told_cell(const ModelRow& row, const ObjectModels& object) {
   return " " + joined(by, "nothing");
 }
 
-// Two tables, each at most 100 columns wide: what the hand feels of each model, and what it is and costs.
+// Two tables, each at most 100 columns wide. The first has the force that the hand feels of each model, the
+// second its setting, times and memory.
 Table<ModelRow> felt_table(const ObjectModels& object) {
   using Row = ModelRow;
   const ObjectModels* const all = &object;

@@ -16,8 +16,8 @@ namespace hybrid {
 std::vector<std::string> told_apart_by(const ModelRow& row, const ObjectModels& object);
 
 // The cheapest of the rows that a hand with a tool cannot tell from the reference, by the p99.9 of the tick.
-// Rows whose times are too near to the least one to tell count as equally cheap. Of these the scene as given
-// is taken, else the most accurate one. Empty: a hand tells every row from the reference.
+// Rows whose times are too near to the least one to tell count as equally cheap. Among these the scene as
+// given comes first, then the most accurate row. Empty: a hand tells every row from the reference.
 std::optional<std::size_t> cheapest_untold(const ObjectModels& object);
 
 // The result for one object in a few sentences, the most important one first.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The objects of a scene in the graphics card's memory. What has not changed since the last frame is not
-// uploaded again. Every call needs the renderer's context to be current.
+// The objects of a scene in the graphics card's memory. Vertices and values are uploaded only if they changed
+// since the last frame. Every call needs the renderer's context to be current.
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -44,7 +44,7 @@ struct SceneMesh {
   GlSection face;            // face of the cut in the present view; empty: no cut
   glm::vec4 kept{kKeepAll};  // plane of the cut: the part on its positive side is drawn
 
-  // ---- of soft objects: what is uploaded ----
+  // ---- soft objects: mesh, displacements and values as they were uploaded last ----
   DrawMesh moving;
   std::vector<glm::vec3> moved_m;
   std::uint64_t values_number = 0;
@@ -55,7 +55,7 @@ class SceneMeshes {
   // Uploads the scene at rest, relative to `origin_m`. `light_vertices`: large meshes are lit at their
   // vertices.
   SceneMeshes(const DrawnScene& scene, const glm::dvec3& origin_m, bool light_vertices);
-  // Uploads what has moved.
+  // Uploads the places of moved rigid objects and the displacements of tissue.
   void move(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue);
   // Cuts the visible objects that a picture cuts in this view (section.h).
   void cut(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const ViewSettings& view);

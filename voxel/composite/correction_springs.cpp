@@ -100,7 +100,6 @@ void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) co
         bool any = false;
         for (std::size_t d = 0; d < 3; ++d) {
           const auto& weight = coarse.weight[d];
-
           const float own = weight[n] + weight[n - coarse.stride_along(d)] + coarse.anchor_weight[d][n];
           spring.weight[d] = std::max(prolonged_weight(fine, middle, d, of_node) - own, 0.0F);
           any = any || spring.weight[d] > 0.0F;

@@ -94,7 +94,8 @@ void CompositeGrid::find_bounds(std::size_t a) noexcept {
       const NodeBox reach = reach_of_bounds(levels_[l], a, kind, pressed, fall_m);
       if (l > 0) hand_on_bounds(l - 1, kind, finer_reach);
       propagate_bounds(levels_[l], a, kind, reach);
-      // A coarse level may have links across gaps that the finer level does not have.
+      // A coarse level may have links across gaps that the finer level does not have. So its nodes under the
+      // finer patch get the finer level's bounds once more.
       if (l > 0) hand_on_bounds(l - 1, kind, finer_reach);
       finer_reach = reach;
     }

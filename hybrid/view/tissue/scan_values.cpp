@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kDarkShare = 0.01, kBrightShare = 0.99;  // percentiles of the values within the object
 
-// Voxels of the object whose values decide what is black and what is white; more would not change them.
+// Largest number of the object's voxels that are sampled for the values of black and white.
 constexpr std::size_t kMostSampled = 200'000;
 
 void choose_black_and_white(ScanVolume& scan, const DrawnInside& inside) {
