@@ -102,7 +102,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"lattice", {"volume"}},
         {"fem", {"lattice"}},
         {"chain", {"lattice"}},
-        {"composite", {"lattice"}},
+        {"composite", {"fem"}},
         {"baseline", {"lattice"}},
         {"multigrid", {"fem"}},
         {"relaxation", {"multigrid"}},

@@ -259,4 +259,53 @@ float updated_weight(float limited, float weight, float limit_ratio, const LinkM
   return std::clamp(limited, weight, limit.max_factor * weight);
 }
 
+HYBRID_MULTIVERSIONED double force_of_bounds(const LevelView& v, const std::array<int, 3>& finer_first,
+                                             const std::array<int, 3>& finer_last) noexcept {
+  const int vectors = static_cast<int>(v.stride / kLanes);
+  std::array<float, kMaxVectors * kLanes> uncovered;  // along x, in rows that cross the finer patch
+  for (std::size_t i = 0; i < v.stride; ++i) {
+    const int at = static_cast<int>(i);
+    uncovered[i] = at >= finer_first[0] && at <= finer_last[0] ? 0.0F : 1.0F;
+  }
+  double sum = 0.0;
+  for (int k = v.first[2]; k <= v.last[2]; ++k) {
+    for (int j = v.first[1]; j <= v.last[1]; ++j) {
+      const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
+      const bool crosses =
+          k >= finer_first[2] && k <= finer_last[2] && j >= finer_first[1] && j <= finer_last[1];
+      Float8 of_row{};
+      for (int o = 0; o < vectors; ++o) {
+        const std::size_t at = row + static_cast<std::size_t>(o * kLanes);
+        const Float8 zero{};
+        Float8 u, pull, x;
+        load(u, v.u + at);
+        load(pull, v.residual + at);
+        if (v.f != nullptr) {
+          load(x, v.f + at);
+          pull += x;
+        }
+        // A bound pushes against the pull of links and loads.
+        Float8 force{};
+        if (v.lower != nullptr) {
+          load(x, v.lower + at);
+          force = (u <= x) & (pull < zero) ? -pull : force;
+        }
+        if (v.negated_upper != nullptr) {
+          load(x, v.negated_upper + at);
+          force = (u >= -x) & (pull > zero) ? -pull : force;
+        }
+        load(x, v.inverse_diagonal + at);
+        force = x > zero ? force : zero;
+        if (crosses) {
+          load(x, uncovered.data() + o * kLanes);
+          force *= x;
+        }
+        of_row += force;
+      }
+      for (int lane = 0; lane < kLanes; ++lane) sum += static_cast<double>(of_row[lane]);
+    }
+  }
+  return sum;
+}
+
 }  // namespace voxel::composite

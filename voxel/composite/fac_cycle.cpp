@@ -2,8 +2,8 @@
 // One FAC cycle over the levels of a CompositeGrid, axis by axis, in the full approximation scheme (FAS):
 // restriction down to the coarsest level, then correction and smoothing level by level up to the finest.
 // Where a finer patch covers a level, the level takes the finer displacements by injection. Its load f there
-// makes its residual equal to the restricted residual of the finer level. Elsewhere its nodes are unknowns
-// with f = 0.
+// makes its residual equal to the restricted residual of the finer level. Elsewhere its nodes are unknowns;
+// f holds the loads of rigid surfaces and of the accurate energy.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"
@@ -25,7 +25,7 @@ composite::LevelView CompositeGrid::view(std::size_t l, std::size_t axis) noexce
   const std::size_t from = level.first_row();
   composite::LevelView v{};
   v.u = level.u[axis].data() + from;
-  v.f = l == 0 && obstacle_bounds_.empty() ? nullptr : level.f.data() + from;
+  v.f = l == 0 && obstacle_bounds_.empty() && !has_bricks_ ? nullptr : level.f.data() + from;
   v.lower = level.bounded[0] ? level.bound[0].data() + from : nullptr;
   v.negated_upper = level.bounded[1] ? level.bound[1].data() + from : nullptr;
   v.residual = level.residual.data() + from;
@@ -66,6 +66,17 @@ void CompositeGrid::inject_from_finer(std::size_t l, std::size_t a) noexcept {
   fill_ghosts(coarse, coarse.u[a].data());
 }
 
+// f = loads of the accurate energy, or 0.
+void CompositeGrid::put_loads(std::size_t l, std::size_t a) noexcept {
+  Level& level = levels_[l];
+  const auto from = static_cast<std::ptrdiff_t>(level.first_row());
+  if (has_bricks_ && l <= covering_level_) {
+    std::copy_n(level.brick_load[a].begin() + from, level.floats(), level.f.begin() + from);
+  } else {
+    std::fill_n(level.f.begin() + from, level.floats(), 0.0F);
+  }
+}
+
 // FAS restriction from level l to l + 1: f = R(residual) + K u at the injected u, on the nodes under level l.
 void CompositeGrid::restrict_residual(std::size_t l, std::size_t a) noexcept {
   Level& fine = levels_[l];
@@ -90,7 +101,7 @@ void CompositeGrid::restrict_residual(std::size_t l, std::size_t a) noexcept {
   }
   inject_from_finer(l + 1, a);
   const std::size_t begin = coarse.first_row(), floats = coarse.floats();
-  std::fill_n(coarse.f.begin() + static_cast<std::ptrdiff_t>(begin), floats, 0.0F);
+  put_loads(l + 1, a);
   composite::link_forces_of_level(view(l + 1, a), first, last);
   restrict_values(coarse, fine, a, fine.residual.data(), coarse.f.data());
   for (int k = first[2]; k <= last[2]; ++k) {
@@ -238,6 +249,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
   const std::size_t last = levels_.size() - 1;
   for (std::size_t a = 0; a < 3; ++a) {
     if (!axes[a]) continue;
+    renew_brick_loads();
     find_bounds(a);
     add_obstacle_bounds(a);
     const auto bound = [](Level& level, std::size_t kind) {
@@ -256,10 +268,8 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     // No level is smoothed before restriction. Otherwise, after a jump of the tool, a fine level would follow
     // its bounds before the coarse levels do, and would pull them too far.
     levels_[0].has_active_stiffness = false;
-    if (!obstacle_bounds_.empty()) {
-      std::fill(levels_[0].f.begin(), levels_[0].f.end(), 0.0F);
-      add_obstacle_loads(0, a);
-    }
+    put_loads(0, a);
+    add_obstacle_loads(0, a);
     for (std::size_t l = 0; l < last; ++l) restrict_residual(l, a);
     add_active_stiffness(last, a);
     for (int n = 0; n < kCoarsestSweeps; ++n) smooth(last);
@@ -287,6 +297,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
     fill_ghosts(levels_[0], levels_[0].u[a].data());
     fit_far_field(a);
     measure_obstacle_forces(a);
+    measure_pressing_force(a);
     update_multipliers(a);
   }
   patch_moved_ = false;

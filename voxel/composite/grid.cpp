@@ -80,6 +80,8 @@ CompositeGrid::CompositeGrid(const Lattice& lattice, int half_width, int coarse_
       axis.reserve(material_.is_heterogeneous() ? plane.cells.capacity() : 0);
   }
   material_.reserve_planes(2 * most + 2);
+  use_bricks();
+  for (Floats& array : bricks_.forces) array.resize(has_bricks_ ? most_floats : 0);
   is_tissue_node_.resize(most_nodes);
   faces_of_cell_.resize(material_.has_scattered_anchors() ? most_floats : 0);
   for (auto& sides : anchor_faces_) {
@@ -136,6 +138,7 @@ glm::dvec3 CompositeGrid::minimum_at(const Level& level, std::size_t n) const no
       sum += static_cast<double>(spring_N_per_m_[d][a] * (weight[d][n] * level.u[a][n + by] +
                                                           weight[d][n - by] * level.u[a][n - by]));
     }
+    if (has_bricks_) sum += static_cast<double>(level.brick_load[a][n]);
     place[static_cast<int>(a)] = sum * static_cast<double>(level.inverse_diagonal[a][n]);
   }
   return place;

@@ -22,13 +22,12 @@
 // each node v lies between L = max(u(s) − dist(v→s)) and U = min(u(s) + dist(s→v)) over the pressed voxels s,
 // with dist along existing links (wave.h). The solution keeps the limits of all links. This follows if one
 // compares the solution with itself, shifted by a voxel (Brezis & Sibony 1971, for plastic torsion). So each
-// node has bounds of its own. With limits of links, projected multigrid stalls where the chain is at its
-// limits; with bounds of nodes it does not. Near a notch or the edge of an anchored region the bounds are
-// still necessary but not sufficient: links may exceed their limits there (worst_violation()). Where tissues
-// differ, links also have multipliers of their own (link_limits.cpp). A link has the mean of the limits of
-// the tissue round its two nodes; on level 0 it is the lattice's.
+// node has bounds of its own (node_bounds.cpp). With limits of links, projected multigrid stalls where the
+// chain is at its limits. Near a notch or the edge of an anchored region links may exceed their limits
+// (worst_violation()). Where tissues differ, links also have multipliers of their own (link_limits.cpp).
 //
-// Rigid surfaces that stand still bound the nodes beside them (rigid_contacts.cpp).
+// Rigid surfaces that stand still bound the nodes beside them (rigid_contacts.cpp). The accurate energy is a
+// load of the nodes (brick_loads.cpp).
 #pragma once
 
 #include <algorithm>
@@ -42,6 +41,7 @@
 #include <vector>
 
 #include "voxel/composite/anchor_chains.h"
+#include "voxel/composite/brick_forces.h"
 #include "voxel/composite/coarse_material.h"
 #include "voxel/composite/level.h"
 #include "voxel/lattice/displacement.h"
@@ -142,8 +142,7 @@ class CompositeGrid {
   void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One FAC cycle over all levels, on these axes.
   void cycle(const std::array<bool, 3>& axes = {true, true, true}) noexcept;
-  // Force on the anchors (N), and force on the tool (N). The latter is minus the sum of the forces on anchors
-  // and rigid surfaces.
+  // Force on the anchors and force on the tool (N), by the balance of the object and of level 0.
   [[nodiscard]] glm::dvec3 force_on_anchors_N() const noexcept;
   [[nodiscard]] glm::dvec3 force_on_tool_N() const noexcept;
   // Largest excess of a link of level 0 over its limits (m).
@@ -184,6 +183,7 @@ class CompositeGrid {
   using AnchorFaces = composite::AnchorFaces;
   using CorrectionSpring = composite::CorrectionSpring;
   using Ghost = composite::Ghost;
+  using GhostNeighbour = composite::GridLevel::GhostNeighbour;
   using ObstacleNode = composite::ObstacleNode;
   using Level = composite::GridLevel;
   // A surface voxel beside a rigid surface, and its surface number.
@@ -272,6 +272,7 @@ class CompositeGrid {
   [[nodiscard]] bool row_near_anchors(const Level& level, int j, int k) const noexcept;
   void mark_tissue_nodes(const Level& level, bool near) noexcept;
   void find_ghosts(Level& level, bool near) noexcept;
+  static void weigh_ghost(Level& level, std::size_t first) noexcept;
   void set_up_transfer(Level& fine, Level& coarse) const noexcept;
   void find_correction_springs(const Level& fine, Level& coarse) const noexcept;
   // Interpolation weights of a coarse node at the fine nodes round it: the fine node at offset (i, j, k),
@@ -323,6 +324,7 @@ class CompositeGrid {
   // ---- fac_cycle.cpp ----
   [[nodiscard]] composite::LevelView view(std::size_t l, std::size_t axis) noexcept;
   void inject_from_finer(std::size_t l, std::size_t axis) noexcept;
+  void put_loads(std::size_t l, std::size_t axis) noexcept;
   void restrict_residual(std::size_t l, std::size_t axis) noexcept;
   void restrict_values(Level& coarse, const Level& fine, std::size_t axis, const float* from,
                        float* to) const noexcept;
@@ -330,6 +332,10 @@ class CompositeGrid {
   void prolong(std::size_t l, std::size_t axis) noexcept;
   void prolong_row(Level& fine, const Level& coarse, std::size_t axis, const float* from, int j, int k,
                    bool adds) const noexcept;
+  // ---- pressing_force.cpp ----
+  void measure_pressing_force(std::size_t axis) noexcept;
+  [[nodiscard]] double force_of_tool_bounds(std::size_t l, std::size_t axis) noexcept;
+  [[nodiscard]] double force_on_patch(std::size_t l, std::size_t axis) noexcept;
   void fit_far_field(std::size_t axis) noexcept;  // far_field.cpp
   // ---- operator_interpolation.cpp ----
   [[nodiscard]] std::array<const float*, 2> weights_beside(const Level& level, std::size_t axis,
@@ -364,6 +370,14 @@ class CompositeGrid {
   [[nodiscard]] const std::array<Floats, 3>& anchor_weights_on(const Level& level, std::size_t axis) const {
     return multipliers_active_[axis] ? level.limited_anchor_weight[axis] : level.anchor_weight;
   }
+  // ---- brick_loads.cpp ----
+  void use_bricks();
+  void find_brick_moduli(Level& level) noexcept;
+  [[nodiscard]] composite::BrickView brick_view(std::size_t l) const noexcept;
+  void renew_brick_loads() noexcept;
+  void save_brick_strains(const Level& level, std::size_t floats) noexcept;
+  void restore_brick_strains(std::size_t l, const Index3& by) noexcept;
+  [[nodiscard]] double brick_energy_J() const noexcept;
   // ---- queries.cpp ----
   [[nodiscard]] glm::dvec3 interpolate(const Level& level, const std::array<double, 3>& place) const noexcept;
   [[nodiscard]] static glm::vec3 interpolate_at(const Level& level, const Index3& at) noexcept;
@@ -415,6 +429,9 @@ class CompositeGrid {
   std::size_t obstacle_cursor_ = 0;               // index into beside_rigid_: the voxel offered last
   bool patch_moved_ = false;                      // a patch moved since the last cycle
   std::array<bool, 3> multipliers_active_{};      // [axis] some link has a multiplier
+  // Force of tool and rigid surfaces on the nodes of one level's patch (N), and that level by axis.
+  glm::dvec3 pressing_force_N_{0.0};
+  std::array<std::size_t, 3> pressed_level_{};
   std::size_t work_ = 0;
   // A half cell is a cube half as long as a link of the level (half_cube()). For one plane of half cells: the
   // number of tissue cells in each, and this number times their stiffness along each axis.
@@ -425,6 +442,8 @@ class CompositeGrid {
   std::array<HalfCells, 2> half_cells_;  // scratch of weigh()
   Floats faces_of_cell_;                 // [nearest node] faces, scratch of gather_anchors()
   std::array<std::array<AnchorFaces, 2>, 3> anchor_faces_;  // [d][0: of anchors above, 1: below], scratch
+  composite::Bricks bricks_;
+  bool has_bricks_ = false;                   // the accurate energy
   std::vector<std::uint8_t> is_tissue_node_;  // scratch of find_ghosts(), with a border of one node
 };
 

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "voxel/composite/brick_forces.h"
+
 namespace voxel::composite {
 
 using Index3 = std::array<int, 3>;  // voxel (i, j, k), node or cube
@@ -48,7 +50,7 @@ struct CorrectionSpring {
   std::array<float, 3> weight;
 };
 // A node outside the tissue, with nodes of the tissue beside it: ghost_neighbours[first … first + count −
-// 1].
+// 1]. It takes the mean of their values, weighted by their stiffness.
 struct Ghost {
   std::uint32_t at, first, count;
 };
@@ -81,6 +83,12 @@ struct GridLevel {
   // Only where limits differ. Mean of the limits of the tissue round each node
   // (CoarseMaterial::TissueLimits).
   std::array<Floats, 3> limit;
+  // Only with the accurate energy (brick_loads.cpp). brick_modulus: of the cell above a node on all axes,
+  // relative to the reference. brick_strain: mean strains that follow those of the cell (DeferredBrick).
+  // [axis] brick_load: force of bricks beyond that of links (N).
+  Floats brick_modulus;
+  std::array<Floats, DeferredBrick::kStrains> brick_strain;
+  std::array<Floats, 3> brick_load;
   std::array<Floats, 3> inverse_diagonal, diagonal;  // [axis] of the stiffness matrix; inverse 0: fixed
   // Of the axis that the cycle is solving (LevelView). restricted_u: u before the level was smoothed.
   Floats f, restricted_u, residual, is_free, is_active, active_stiffness, inverse_with_active;
@@ -90,7 +98,11 @@ struct GridLevel {
   bool has_anchors = false;           // some node has an anchor weight
   bool has_gaps = false;              // some link within the patch is missing
   std::vector<Ghost> ghosts;
-  std::vector<std::uint32_t> ghost_neighbours;
+  struct GhostNeighbour {
+    std::uint32_t node;
+    float weight;  // those of a ghost sum to 1
+  };
+  std::vector<GhostNeighbour> ghost_neighbours;
   std::vector<CorrectionSpring> correction_springs;
   std::vector<ObstacleNode> obstacle_nodes;
   std::vector<std::uint32_t> obstacle_of;  // [node] 1 + index into obstacle_nodes; 0: none

@@ -63,6 +63,7 @@ void CompositeGrid::put_to_rest(Level& level) noexcept {
   for (auto* arrays : {&level.u, &level.at_bound}) {
     for (Floats& axis : *arrays) std::fill(axis.begin(), axis.end(), 0.0F);
   }
+  for (Floats& strain : level.brick_strain) std::fill(strain.begin(), strain.end(), 0.0F);
   level.bounded = {};
   level.moved = false;
 }
@@ -105,6 +106,8 @@ void CompositeGrid::begin(const Index3& centre) noexcept {
     if (level.moved) put_to_rest(level);
     level.moved = true;
   }
+  pressing_force_N_ = glm::dvec3(0.0);
+  pressed_level_ = {};
   pressed_.clear();
   obstacle_bounds_.clear();
   supporting_bounds_.clear();
@@ -147,6 +150,7 @@ void CompositeGrid::move_patch(std::size_t l) noexcept {
     std::fill(level.u[a].begin(), level.u[a].end(), 0.0F);
     std::fill(level.at_bound[a].begin(), level.at_bound[a].end(), 0.0F);
   }
+  save_brick_strains(level, floats);
   const auto& nodes = level.nodes;
   Index3 by{};
   for (std::size_t d = 0; d < 3; ++d) by[d] = (nodes[d].begin - before_move_.nodes[d].begin) / level.step;
@@ -175,6 +179,7 @@ void CompositeGrid::move_patch(std::size_t l) noexcept {
   }
   assemble(level);
   restore_multipliers(level, by);
+  restore_brick_strains(l, by);
   list_obstacle_nodes(l);
 }
 

@@ -16,18 +16,6 @@ constexpr std::size_t kFewerGhosts = 16;  // factor by which an object that fill
 constexpr double kAnchoredSide = 0.25;
 constexpr float kMinWeight = 1e-3F;   // of a full link: a link of less weight is missing
 constexpr float kAlmostAll = 0.999F;  // of a full link: through a link of less weight there may be a gap
-constexpr std::array<std::array<int, 3>, 26> kAround = [] {
-  std::array<std::array<int, 3>, 26> around{};
-  std::size_t n = 0;
-  for (int k = -1; k <= 1; ++k) {
-    for (int j = -1; j <= 1; ++j) {
-      for (int i = -1; i <= 1; ++i) {
-        if (i != 0 || j != 0 || k != 0) around[n++] = {i, j, k};
-      }
-    }
-  }
-  return around;
-}();
 
 // The largest multiple of `step` that is <= at.
 int floor_to_multiple(int at, int step) {
@@ -75,6 +63,11 @@ void CompositeGrid::allocate(Level& level, std::size_t l) const {
   if (material_.has_own_limits()) {
     for (Floats& array : level.limit) array.assign(floats, 1.0F);
   }
+  if (lattice_.has_bricks()) {
+    level.brick_modulus.assign(floats, 0.0F);
+    for (Floats& array : level.brick_load) array.assign(floats, 0.0F);
+    for (Floats& array : level.brick_strain) array.assign(floats, 0.0F);
+  }
   // There are about as many ghosts as surface nodes.
   const std::size_t share = material_.fills_box() ? kFewerGhosts : 1;
   if (!material_.fills_box() || material_.has_scattered_anchors())
@@ -105,6 +98,7 @@ void CompositeGrid::allocate_for_moves() {
   for (auto* arrays : {&before_move_.u, &before_move_.at_bound}) {
     for (Floats& axis : *arrays) axis.assign(most, 0.0F);
   }
+  for (Floats& strain : before_move_.brick_strain) strain.assign(lattice_.has_bricks() ? most : 0, 0.0F);
   for (std::size_t a = 0; material_.is_heterogeneous() && a < 3; ++a) {
     for (auto* arrays : {&before_move_.limited_weight[a], &before_move_.limited_anchor_weight[a]}) {
       for (Floats& axis : *arrays) axis.assign(most, 0.0F);
@@ -213,6 +207,7 @@ void CompositeGrid::assemble(Level& level) noexcept {
   if (near && gathers_anchors(level)) gather_anchors(level);
   find_diagonal(level, near);
   find_ghosts(level, near);
+  if (has_bricks_) find_brick_moduli(level);
 }
 
 // Removes links that a gap or an anchor interrupts, and finds the weights of the links to anchors.
@@ -367,74 +362,6 @@ void CompositeGrid::find_diagonal(Level& level, bool near) noexcept {
         }
       }
     }
-  }
-}
-
-// Marks the nodes of the tissue: unknowns, and nodes that are anchored or linked to something.
-void CompositeGrid::mark_tissue_nodes(const Level& level, bool near) noexcept {
-  const auto& nodes = level.nodes;
-  const std::size_t wide = index(nodes[0].count + 2), plane = wide * index(nodes[1].count + 2);
-  std::fill_n(is_tissue_node_.begin(), plane * index(nodes[2].count + 2), std::uint8_t{0});
-  for (int k = 0; k < nodes[2].count; ++k) {
-    for (int j = 0; j < nodes[1].count; ++j) {
-      std::uint8_t* const mark = is_tissue_node_.data() + index(k + 1) * plane + index(j + 1) * wide + 1;
-      const std::size_t row = level.row(j, k);
-      for (int i = 0; i < nodes[0].count; ++i) {
-        const std::size_t n = row + index(i);
-        bool any = level.inverse_diagonal[0][n] != 0.0F;
-        for (std::size_t d = 0; d < 3 && !any; ++d) {
-          any = level.weight[d][n] != 0.0F || level.weight[d][n - level.stride_along(d)] != 0.0F ||
-                level.anchor_weight[d][n] != 0.0F;
-        }
-        any = any || (near && material_.is_anchored({level.at(0, i), level.at(1, j), level.at(2, k)}));
-        mark[i] = any ? 1 : 0;
-      }
-    }
-  }
-}
-
-// Finds the ghosts: nodes outside the tissue with nodes of the tissue beside them. Finer levels interpolate
-// between ghosts and tissue nodes, so a ghost takes the mean of its tissue neighbours.
-void CompositeGrid::find_ghosts(Level& level, bool near) noexcept {
-  const auto& nodes = level.nodes;
-  level.ghosts.clear();
-  level.ghost_neighbours.clear();
-  mark_tissue_nodes(level, near);
-  const auto wide = static_cast<std::ptrdiff_t>(nodes[0].count + 2), plane = wide * (nodes[1].count + 2);
-  for (int k = 0; k < nodes[2].count; ++k) {
-    for (int j = 0; j < nodes[1].count; ++j) {
-      const std::uint8_t* const mark = is_tissue_node_.data() + (k + 1) * plane + (j + 1) * wide + 1;
-      for (int i = 0; i < nodes[0].count; ++i) {
-        if (mark[i] != 0) continue;
-        const auto first = static_cast<std::uint32_t>(level.ghost_neighbours.size());
-        for (const auto& way : kAround) {
-          if (mark[i + way[0] + way[1] * wide + way[2] * plane] != 0 &&
-              level.ghost_neighbours.size() < level.ghost_neighbours.capacity())
-            level.ghost_neighbours.push_back(
-                static_cast<std::uint32_t>(level.node(i + way[0], j + way[1], k + way[2])));
-        }
-        const auto count = static_cast<std::uint32_t>(level.ghost_neighbours.size()) - first;
-        if (count > 0 && level.ghosts.size() < level.ghosts.capacity())
-          level.ghosts.push_back({static_cast<std::uint32_t>(level.node(i, j, k)), first, count});
-      }
-    }
-  }
-}
-
-void CompositeGrid::fill_ghosts(const Level& level, float* values) const noexcept {
-  for (const Ghost& g : level.ghosts) {
-    float sum = 0.0F;
-    for (std::uint32_t n = g.first; n < g.first + g.count; ++n) sum += values[level.ghost_neighbours[n]];
-    values[g.at] = sum / static_cast<float>(g.count);
-  }
-}
-
-void CompositeGrid::distribute_ghost_loads(const Level& level, float* loads) const noexcept {
-  for (const Ghost& g : level.ghosts) {
-    const float share = loads[g.at] / static_cast<float>(g.count);
-    loads[g.at] = 0.0F;
-    if (share == 0.0F) continue;
-    for (std::uint32_t n = g.first; n < g.first + g.count; ++n) loads[level.ghost_neighbours[n]] += share;
   }
 }
 

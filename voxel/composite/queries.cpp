@@ -53,36 +53,6 @@ double CompositeGrid::link_share(std::size_t l, std::size_t number, std::size_t 
   return inside_share(level, e, node[e]) * inside_share(level, f, node[f]) * (1.0 - under);
 }
 
-glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
-  glm::dvec3 on_object_N = -force_on_anchors_N();
-  for (const ObstacleBound& b : obstacle_bounds_) on_object_N += force_of(b);
-  return on_object_N;
-}
-
-glm::dvec3 CompositeGrid::force_on_anchors_N() const noexcept {
-  glm::dvec3 reaction(0.0);
-  for (std::size_t l = 0; l <= covering_level_; ++l) {
-    const Level& level = levels_[l];
-    if (!level.has_anchors) continue;
-    const std::size_t first = level.first_row(), end = first + level.floats();
-    for (std::size_t d = 0; d < 3; ++d) {
-      const float* const weight = level.anchor_weight[d].data();
-      const std::array<const float*, 3> limited{anchor_weights_on(level, 0)[d].data(),
-                                                anchor_weights_on(level, 1)[d].data(),
-                                                anchor_weights_on(level, 2)[d].data()};
-      for (std::size_t n = first; n < end; ++n) {
-        if (weight[n] == 0.0F) continue;
-        if (!counts_anchors(l, n - first)) continue;
-        for (std::size_t a = 0; a < 3; ++a) {
-          reaction[static_cast<int>(a)] +=
-              static_cast<double>(limited[a][n] * spring_N_per_m_[d][a] * level.u[a][n]);
-        }
-      }
-    }
-  }
-  return reaction;
-}
-
 double CompositeGrid::worst_violation() const noexcept {
   const Level& level = levels_[0];
   const auto& nodes = level.nodes;
@@ -109,7 +79,7 @@ double CompositeGrid::worst_violation() const noexcept {
 }
 
 double CompositeGrid::energy_J() const noexcept {
-  double energy = 0.0;
+  double energy = brick_energy_J();
   for (std::size_t l = 0; l <= covering_level_; ++l) {
     const Level& level = levels_[l];
     const std::size_t first = level.first_row(), end = first + level.floats();
@@ -244,7 +214,7 @@ std::size_t CompositeGrid::memory_bytes() const {
           &level.active_stiffness, &level.inverse_with_active, &level.bound[0], &level.bound[1]})
       bytes += array->capacity() * sizeof(float);
     bytes += level.ghosts.capacity() * sizeof(Ghost) +
-             level.ghost_neighbours.capacity() * sizeof(std::uint32_t) +
+             level.ghost_neighbours.capacity() * sizeof(GhostNeighbour) +
              level.correction_springs.capacity() * sizeof(CorrectionSpring) +
              level.obstacle_nodes.capacity() * sizeof(ObstacleNode) +
              level.obstacle_of.capacity() * sizeof(std::uint32_t);

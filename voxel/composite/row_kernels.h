@@ -107,6 +107,11 @@ void follow_bounds(float* u, const float* at_bound, const float* lower, const fl
 void note_at_bound(float* at_bound, const float* u, const float* lower, const float* negated_upper,
                    std::size_t count) noexcept;
 
+// Sum of the forces (N) of the bounds that hold nodes, over the unknowns that are not strictly within the
+// finer patch (as for mode_response()). view.residual must hold −K u.
+[[nodiscard]] double force_of_bounds(const LevelView& view, const std::array<int, 3>& finer_first,
+                                     const std::array<int, 3>& finer_last) noexcept;
+
 // ---- line_search_kernels.cpp ----
 
 // The part of u that its bounds do not prescribe. For u > 0 it is u − max(lower bound, 0), at most upper

@@ -83,12 +83,17 @@ bool alike_in_poisson(std::span<const LinkMaterial> materials) {
                      [&](const LinkMaterial& m) { return m.poisson == materials.front().poisson; });
 }
 
+bool all_bricks(std::span<const LinkMaterial> materials) {
+  return std::all_of(materials.begin(), materials.end(), [](const LinkMaterial& m) { return m.bricks; });
+}
+
 }  // namespace
 
 CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
   if (!alike_in_poisson(lattice.materials().subspan(1))) return {"its materials differ in Poisson's ratio"};
   if (lattice.has_plasticity()) return {"it keeps dents"};
-  if (lattice.has_bricks()) return {"it is of the accurate energy"};
+  if (lattice.has_bricks() && !all_bricks(lattice.materials().subspan(1)))
+    return {"only some of its materials have the accurate energy"};
   for (int d = 0; d < 3; ++d) {
     const LinkLimit& l = lattice.tightest(d);
     if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return {"its links have no slack"};
@@ -162,6 +167,7 @@ double CompositeGrid::settled_press(const Index3& place, const glm::dvec3& push_
   constexpr double kSettled = 1e-3;                 // change in a round, as a share of the force
   std::array<bool, 3> axes{};
   axes[index(largest_axis(push_m))] = true;
+  if (has_bricks_) axes.fill(true);
   begin(place);
   double felt_N = 0.0;
   for (int round = 0; round < kRounds; ++round) {

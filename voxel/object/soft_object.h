@@ -245,7 +245,7 @@ class SoftObject {
 
   // Force of the springs on the anchors (N, body frame); at rest it equals the force that presses the object.
   // Empty if a link to an anchor is at its limit, because the spring of such a link does not show the link's
-  // load. For references.
+  // load. Also empty if the contact is on patches. For references.
   [[nodiscard]] std::optional<glm::dvec3> carried_by_anchors_N() const noexcept;
   // Energy of the springs plus plastic dissipation since the last state of rest (J). For tests and reports.
   [[nodiscard]] double energy_J() const noexcept;

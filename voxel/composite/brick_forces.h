@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Forces of bricks (hex_element.h) on the nodes of a level, cell by cell, in vectors of 8 cells along x.
+//
+// A rectangular brick is symmetric under mirroring along each axis. In terms of the parities of its corner
+// displacements, its stiffness matrix therefore falls into eight blocks of 3 × 3. With the transform of the
+// corners (a Walsh–Hadamard transform) a brick costs 72 products in place of 576.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "voxel/fem/hex_element.h"
+
+namespace voxel::composite {
+
+// Blocks of minus a brick's stiffness (N/m). block[q][a][b] couples component a of parity q ^ 2^a with
+// component b of parity q ^ 2^b. A parity p = x + 2y + 4z has x, y, z = 1 for an odd function along that
+// axis.
+struct BrickBlocks {
+  std::array<std::array<std::array<float, 3>, 3>, 8> block{};
+};
+// Only for a matrix that is symmetric under the three mirrorings.
+[[nodiscard]] BrickBlocks brick_blocks(const BrickStiffness& brick);
+
+// A mean strain of a brick, as a sum over components a: weight[a] times component a of parity q ^ 2^a. Its
+// force on them is -stiffness · weight[a] · strain.
+struct MeanStrain {
+  std::size_t q = 0;
+  std::array<float, 3> weight{};
+  float stiffness = 0.0F;
+  float follows = 1.0F;  // share of a change of the strain that a cycle takes
+};
+// A brick less its links, as parts for an iteration that solves for the links (deferred correction). The
+// dilation and the three shears are much stiffer in bricks than in links: 1 / (1 − 2ν) times, and up to 4
+// times. So their strains are taken over cycles, each by its own share. All else is at most 1.4 times as
+// stiff, and is taken at once.
+struct DeferredBrick {
+  static constexpr std::size_t kStrains = 4;
+  std::array<MeanStrain, kStrains> strain;  // dilation; shears of the planes xy, xz, yz
+  BrickBlocks rest;
+};
+[[nodiscard]] DeferredBrick deferred_brick(const BrickStiffness& brick, const BrickStiffness& links);
+
+// One level, from its first row on.
+struct BrickView {
+  std::array<const float*, 3> u;  // [axis] displacements (m)
+  const float* modulus;           // of the cell above each node on all axes, relative to the brick's
+  float scale;                    // of stiffness: edge of a cell, relative to the brick's
+  std::array<float*, 3> force;    // [axis] receives the forces (N) in addition to its values
+  std::array<int, 3> cells;       // along each axis
+  // Cells without forces, from the first to the last along each axis, as a finer patch covers them. None if
+  // the last is before the first.
+  std::array<int, 3> covered_first, covered_last;
+  std::size_t stride, plane;  // to the next node along y, along z
+};
+inline constexpr float kNewStrain = 1e30F;  // strain of a cell that takes the present strain at once
+// Forces of bricks at the displacements u.
+void add_brick_forces(const BrickView& view, const BrickBlocks& blocks) noexcept;
+// Forces of bricks less their links, with strains that follow those of u. strains: [strain] by cell.
+void add_deferred_forces(const BrickView& view, const DeferredBrick& brick,
+                         const std::array<float*, DeferredBrick::kStrains>& strains) noexcept;
+
+// The bricks of an object: of a cell between voxels of the reference, less its links, in parts and as a
+// whole.
+struct Bricks {
+  DeferredBrick deferred;
+  BrickBlocks less_links;
+  mutable std::array<std::vector<float>, 3> forces;  // [axis] scratch
+};
+
+}  // namespace voxel::composite
