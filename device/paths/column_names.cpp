@@ -232,9 +232,7 @@ void cut_unit_words(std::vector<NamePart>& parts, StatedUnit& stated) {
     return;
   }
   const std::size_t count = parts.size() - first;
-  if (count == 1) {
-    stated.state(parts.back().text, as_unit(parts.back()));
-  } else if (count == 2 && lower_ascii(parts[first].text) == "in") {
+  if (count == 1 || (count == 2 && lower_ascii(parts[first].text) == "in")) {
     stated.state(parts.back().text, as_unit(parts.back()));
   } else {
     stated.state(parts.back().text, Unit{});

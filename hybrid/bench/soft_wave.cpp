@@ -18,7 +18,7 @@ struct Wave {
   int axes = 1;                     // 1: down; 3: equally far along x, y and z
 };
 
-struct Engine {
+struct TimedEngine {
   SoftEngine name;
   std::unique_ptr<WaveEngine> does;
   std::vector<double> us;
@@ -27,8 +27,8 @@ struct Engine {
 // Turns of product and baseline, and counted runs in a turn (tests/README.md).
 constexpr std::size_t kLeastTurns = 1, kMostTurns = 20, kRunsInTurn = 5;
 
-std::vector<Engine> engines_of(const std::vector<SoftEngine>& names) {
-  std::vector<Engine> engines;
+std::vector<TimedEngine> engines_of(const std::vector<SoftEngine>& names) {
+  std::vector<TimedEngine> engines;
   engines.reserve(names.size());
   for (const SoftEngine name : names) engines.push_back({name, make_wave_engine(name), {}});
   return engines;
@@ -46,7 +46,7 @@ Push push_of(const Wave& wave, const std::array<int, 3>& dims) {
           .moves = {wave.axes == 3 ? glm::vec3(by, by, -by) : glm::vec3(0.0F, 0.0F, -by)}};
 }
 
-SoftRow row_of(const Wave& wave, Engine& engine, const voxel::LabelVolume& volume,
+SoftRow row_of(const Wave& wave, TimedEngine& engine, const voxel::LabelVolume& volume,
                const voxel::LatticeOptions& options) {
   SoftRow row{.test_case = "wave",
               .engine = engine.name,
@@ -88,16 +88,16 @@ void add_with_speedup(std::vector<SoftRow> rows, const AddRow& add) {
 // a turn does not count: the caches still hold the data of the other engine, and nobody uses two engines at
 // once. (With a turn of one run, the cache lines of classic were written back to memory during our runs. That
 // was half of the time of a wave ten spacings deep.)
-void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::LabelVolume& volume,
+void run_wave(const Wave& wave, std::vector<TimedEngine>& engines, const voxel::LabelVolume& volume,
               const voxel::LatticeOptions& options, double most_us, const AddRow& add) {
   double spent_us = 0.0;
-  for (Engine& engine : engines) {
+  for (TimedEngine& engine : engines) {
     engine.does->prepare(volume, options, push_of(wave, volume.dims));
     engine.us.clear();
   }
   for (std::size_t turn = 0; turn < kMostTurns && (turn < kLeastTurns || spent_us < most_us); ++turn) {
     for (std::size_t e = 0; e < engines.size(); ++e) {
-      Engine& engine = engines[(turn + e) % engines.size()];
+      TimedEngine& engine = engines[(turn + e) % engines.size()];
       for (std::size_t n = 0; n <= kRunsInTurn; ++n) {
         engine.does->rest();
         const double us = engine.does->run_us();
@@ -108,14 +108,14 @@ void run_wave(const Wave& wave, std::vector<Engine>& engines, const voxel::Label
   }
   std::vector<SoftRow> rows;
   rows.reserve(engines.size());
-  for (Engine& engine : engines) rows.push_back(row_of(wave, engine, volume, options));
+  for (TimedEngine& engine : engines) rows.push_back(row_of(wave, engine, volume, options));
   add_with_speedup(std::move(rows), add);
 }
 
 // The published comparison: 50 voxels along an edge, and one voxel of the top pushed a hundred times by a
 // tenth of a spacing. The slack is chosen to displace 25,234 voxels, as published. The time of a push is the
 // median over the rounds.
-void run_pushes(std::vector<Engine>& engines, int rounds, const AddRow& add) {
+void run_pushes(std::vector<TimedEngine>& engines, int rounds, const AddRow& add) {
   constexpr int pushes = 100, edge = 50;
   const Wave wave{.material = "homogeneous", .depth = 10.0, .slack = 0.3};
   const voxel::LabelVolume volume = wave_volume(wave.material, {edge, edge, edge});
@@ -123,7 +123,7 @@ void run_pushes(std::vector<Engine>& engines, int rounds, const AddRow& add) {
   Push push = push_of(wave, volume.dims);
   push.moves.front() /= static_cast<float>(pushes);
   std::vector<std::vector<std::vector<double>>> us(engines.size(), std::vector<std::vector<double>>(pushes));
-  for (Engine& engine : engines) engine.does->prepare(volume, options, push);
+  for (TimedEngine& engine : engines) engine.does->prepare(volume, options, push);
   for (int round = -1; round < rounds; ++round) {  // the first round is a warm-up
     for (std::size_t e = 0; e < engines.size(); ++e) {
       engines[e].does->rest();
@@ -163,7 +163,7 @@ std::vector<Wave> study(bool quick) {
 }  // namespace
 
 void bench_waves(const SoftBenchOptions& options, const std::vector<SoftEngine>& names, const AddRow& add) {
-  std::vector<Engine> engines = engines_of(names);
+  std::vector<TimedEngine> engines = engines_of(names);
   const auto tell = [&options](const Wave& w) {
     if (options.progress)
       options.progress(fmt::format("a wave {:g} spacings deep at slack {:g} through {}, {} axes", w.depth,

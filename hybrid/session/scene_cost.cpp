@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kPlaces = 4;  // places of contact that are measured
 // Time in which the hand moves in free space before it reaches the object.
-constexpr double kBefore_s = 0.05;
+constexpr double kBeforeArrival_s = 0.05;
 constexpr double kSample_s = 0.25;  // measured time at each place
 constexpr double kLook_s = 1e-3;    // time between two samples of the path
 // Samples of the path at most. A longer path is sampled more coarsely.
@@ -52,7 +52,7 @@ std::vector<double> arrivals_s(const World& world, const WorldState& state, cons
     if (state.map.rigid_in(at - margin, at + margin) == 0 &&
         state.map.soft_in(at - margin, at + margin, voxel) == 0)
       continue;
-    if (arrivals.empty() || t > near_until_s + kBefore_s) arrivals.push_back(t);
+    if (arrivals.empty() || t > near_until_s + kBeforeArrival_s) arrivals.push_back(t);
     near_until_s = t;
   }
   return arrivals;
@@ -77,7 +77,7 @@ SceneCost measure_cost(const Scene& scene, const BuiltScene& built) {
     copy.state = copy_state(*copy.world, *built.state);
     SessionOptions options{.seconds = kSample_s, .keep_recording = false, .progress = {}};
     options.async_relaxation = true;
-    options.path = std::make_shared<const PathFrom>(path, std::max(0.0, arrival - kBefore_s));
+    options.path = std::make_shared<const PathFrom>(path, std::max(0.0, arrival - kBeforeArrival_s));
     SessionResult felt;
     try {
       felt = run_session(scene, copy, options);

@@ -65,7 +65,8 @@ EditedText write_values(const std::string& text, const std::filesystem::path& fi
     if (reason.empty()) {
       out.changed.push_back(what);
     } else {
-      out.left.push_back(what + " (" + reason + ")");
+      out.left.push_back(what);
+      out.left.back().append(" (").append(reason).append(")");
     }
   }
   out.text = editor.text();

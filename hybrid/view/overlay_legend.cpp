@@ -9,7 +9,7 @@ namespace hybrid {
 namespace {
 
 constexpr float kLine = 1.6F;       // row pitch (em)
-constexpr float kMargin = 0.6F;     // between the parts of the column (em)
+constexpr float kPartGap = 0.6F;    // between the parts of the column (em)
 constexpr float kLeastRows = 6.0F;  // least rows of the legend, even if they cover the parts below
 
 // Column widths of the legend (pixels). They do not depend on the forces, so that nothing jumps in a window.
@@ -66,7 +66,7 @@ void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapsh
   const PixelRect& column = content.layout.column;
   if (column.width == 0) return;
   const float em = pen.em;
-  const float width = static_cast<float>(column.width) - kMargin * em;
+  const float width = static_cast<float>(column.width) - kPartGap * em;
   const auto left = static_cast<float>(column.x);
   const auto part = [&](float top, float height_em) {
     return PixelRect{column.x, static_cast<int>(top), static_cast<int>(width),
@@ -74,8 +74,8 @@ void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapsh
   };
   const float end = static_cast<float>(content.inset ? content.layout.inset.y : column.y + column.height);
   const bool scale = content.scale.end > 0.0;
-  const float charts = scale ? kColourScaleHeight + kMargin : 0.0F;
-  const float room = (end - static_cast<float>(column.y)) / em - charts - kMargin;
+  const float charts = scale ? kColourScaleHeight + kPartGap : 0.0F;
+  const float room = (end - static_cast<float>(column.y)) / em - charts - kPartGap;
   const float rows_fit = (room - 1.0F) / kLine;
   std::vector<LegendRow> rows =
       legend_rows(scene, snapshot, static_cast<std::size_t>(std::max(rows_fit, kLeastRows)));
@@ -84,7 +84,7 @@ void draw_column(const Pen& pen, const DrawnScene& scene, const Snapshot& snapsh
     row.name = pen.fit(row.name, columns.name - indent(pen, row) - pen.width(row.more));
   draw_rows(pen, {left, static_cast<float>(column.y)}, rows, columns);
   const float y =
-      static_cast<float>(column.y) + em * (kLine * static_cast<float>(rows.size()) + 1.0F + kMargin);
+      static_cast<float>(column.y) + em * (kLine * static_cast<float>(rows.size()) + 1.0F + kPartGap);
   if (scale) {
     if (y + kColourScaleHeight * em < end) draw_colour_scale(pen, part(y, kColourScaleHeight), content.scale);
   }

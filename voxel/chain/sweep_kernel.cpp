@@ -6,7 +6,6 @@
 
 #include "voxel/chain/lanes16.h"
 #include "voxel/chain/lanes8.h"
-#include "voxel/lattice/simd_dispatch.h"
 
 namespace voxel {
 namespace {
@@ -32,19 +31,29 @@ HYBRID_TARGET_512 SweepResult sweep_lower16(const SweepTask& task, int most_visi
 }
 #endif
 
-HYBRID_MULTIVERSIONED SweepResult sweep_raise8(const SweepTask& task, int most_visits, Moved* moves) {
-  return kernel8::sweep_by_registers<true>(task, most_visits, moves);
+// For any processor. Without AVX2 nothing permutes eight floats by an index, so limits are read from memory.
+SweepResult sweep_raise_any(const SweepTask& task, int most_visits, Moved* moves) {
+  return kernel8::sweep_rows<true, 0>(task, most_visits, moves);
 }
-HYBRID_MULTIVERSIONED SweepResult sweep_lower8(const SweepTask& task, int most_visits, Moved* moves) {
-  return kernel8::sweep_by_registers<false>(task, most_visits, moves);
+SweepResult sweep_lower_any(const SweepTask& task, int most_visits, Moved* moves) {
+  return kernel8::sweep_rows<false, 0>(task, most_visits, moves);
 }
 
 #if HYBRID_LANES16
-constexpr std::array<SweepKernels, 2> kKernels{SweepKernels{sweep_raise8, sweep_lower8},
+__attribute__((target("avx2"))) SweepResult sweep_raise8(const SweepTask& task, int most_visits,
+                                                         Moved* moves) {
+  return kernel8::sweep_by_registers<true>(task, most_visits, moves);
+}
+__attribute__((target("avx2"))) SweepResult sweep_lower8(const SweepTask& task, int most_visits,
+                                                         Moved* moves) {
+  return kernel8::sweep_by_registers<false>(task, most_visits, moves);
+}
+constexpr std::array<SweepKernels, 3> kKernels{SweepKernels{sweep_raise_any, sweep_lower_any},
+                                               SweepKernels{sweep_raise8, sweep_lower8},
                                                SweepKernels{sweep_raise16, sweep_lower16}};
-const std::size_t kCount = lanes16::has_lanes16() ? 2 : 1;
+const std::size_t kCount = lanes16::has_lanes16() ? 3 : __builtin_cpu_supports("avx2") != 0 ? 2 : 1;
 #else
-constexpr std::array<SweepKernels, 1> kKernels{SweepKernels{sweep_raise8, sweep_lower8}};
+constexpr std::array<SweepKernels, 1> kKernels{SweepKernels{sweep_raise_any, sweep_lower_any}};
 constexpr std::size_t kCount = 1;
 #endif
 

@@ -55,7 +55,7 @@ void CompositeGrid::find_ghosts(Level& level, bool near) noexcept {
   level.ghosts.clear();
   level.ghost_neighbours.clear();
   mark_tissue_nodes(level, near);
-  const auto wide = static_cast<std::ptrdiff_t>(nodes[0].count + 2), plane = wide * (nodes[1].count + 2);
+  const auto wide = static_cast<std::ptrdiff_t>(nodes[0].count) + 2, plane = wide * (nodes[1].count + 2);
   for (int k = 0; k < nodes[2].count; ++k) {
     for (int j = 0; j < nodes[1].count; ++j) {
       const std::uint8_t* const mark = is_tissue_node_.data() + (k + 1) * plane + (j + 1) * wide + 1;

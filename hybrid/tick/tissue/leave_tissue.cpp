@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -68,7 +69,9 @@ bool leave_tissue(const World& world, WorldState& state) noexcept {
     way += glm::length(lattice.spacing_m() * glm::dvec3(dims[0], dims[1], dims[2]));
   }
   way += 2.0 * world.tool.radius_m;
-  for (double far = step; far <= way + step; far += step) {
+  const auto steps = static_cast<std::int64_t>(way / step) + 1;
+  for (std::int64_t k = 1; k <= steps; ++k) {
+    const double far = static_cast<double>(k) * step;
     for (std::size_t o = 0; o < state.soft.size(); ++o) {
       for (int n = 0; n < 27; ++n) {
         const glm::dvec3 to(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
