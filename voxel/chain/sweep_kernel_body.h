@@ -66,10 +66,9 @@ HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
 
 // Finds the displacements that all paths within a row require. In each step the paths double their length:
 // one link, two, four, … Five steps suffice, where single links would take up to 31. Paths upwards and
-// downwards are independent, because a detour is never stronger than the direct path. Each step needs the
-// result of the step before it. So their steps alternate: the processor does one while it waits for the
-// other. `up`: limits between lanes n − 1 and n. `down`: limits between n and n + 1. False, with `required`
-// undefined: no link requires a move.
+// downwards are independent, because a detour is never stronger than the direct path. Their steps alternate:
+// one can run while the other waits for its last result. `up`: limits between lanes n − 1 and n. `down`:
+// limits between n and n + 1. False, with `required` undefined: no link requires a move.
 template <bool kRaise>
 HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& down, float margin,
                              RowValues& required) {
