@@ -99,8 +99,9 @@ double ToolIntegrator::slip(ToolMotion& motion, const AppliedForces& pull, doubl
     moved.velocity_m_per_s = kRest;
   }
   if (glm::dot(moved.position_m - motion.position_m, along) < 0.0) {
-    // The tool oscillates within the substep, and friction in this direction would have done positive work.
-    // So the impulse of friction is subtracted from the momentum at the end of the substep.
+    // The tool oscillates within the substep and ends behind its start, seen along `along`. A constant
+    // friction along -`along` would have done positive work. So the substep is computed without friction, and
+    // the impulse of friction is then subtracted from the momentum.
     time_s = step_s;
     moved = pull.after(step, motion, at_s, kRest);
     const double left = glm::length(moved.velocity_m_per_s);

@@ -11,6 +11,7 @@
 
 #include "hybrid/base/process_memory.h"
 #include "hybrid/build/build_objects.h"
+#include "hybrid/build/choose_model.h"
 #include "hybrid/build/remove_overlap.h"
 #include "hybrid/build/soft_notes.h"
 #include "hybrid/build/thin_object.h"
@@ -190,9 +191,10 @@ class Builder {
 
   void use_patches(const std::vector<Box>& boxes, std::size_t o) {
     voxel::SoftObject& object = *built_.state->soft[o];
-    if (object.lattice().voxel_count() < voxel::SoftObject::kLeastOnGrid || !scene_.soft[o].patches) return;
+    if (!scene_.soft[o].patches) return;
     const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
-    std::string obstacle = may_meet(boxes, o);
+    std::string obstacle;
+    if (object.lattice().voxel_count() >= voxel::SoftObject::kLeastOnGrid) obstacle = may_meet(boxes, o);
     if (obstacle.empty()) obstacle = object.use_composite_grid(tool);
     built_.notes.push_back(
         {world_->soft[o].name, polygon::Severity::info,
@@ -364,10 +366,7 @@ class Builder {
     world_->tool = scene_.tool;
     world_->set_scale(box_.low, box_.high);
     world_->limits = scene_.safety;
-    if (!scene_.max_force_given) {
-      const double most = scene_limits(scene_).max_force_N;
-      if (most > 0.0 && std::isfinite(most)) world_->limits.max_force_N = most;
-    }
+    world_->limits.max_force_N = greatest_force_N(scene_);
     world_->encoder_m = scene_limits(scene_).resolution_m;
     world_->limits.deadline_s = scene_.deadline_periods / scene_.rate_hz;
     // An ideal device follows its path whatever the force is, so it absorbs no energy.

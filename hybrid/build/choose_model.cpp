@@ -48,8 +48,9 @@ struct Choice {
 Choice choose(const Scene& scene, const SoftDescription& soft) {
   if (scene.tool.shape == Tool::Shape::punch) return {false, "a punch is felt by voxels alone"};
   const device::DeviceLimits limits = scene_limits(scene);
-  double force_N = scene.max_force_given ? scene.safety.max_force_N : limits.max_force_N;
-  if (!(force_N > 0.0) || !std::isfinite(force_N)) force_N = kStrongForce_N;
+  const bool limited =
+      scene.max_force_given || (limits.max_force_N > 0.0 && std::isfinite(limits.max_force_N));
+  const double force_N = limited ? greatest_force_N(scene) : kStrongForce_N;
   double most = kRigidToAHand_N_per_m;
   if (limits.max_stiffness_N_per_m > 0.0) most = std::min(most, limits.max_stiffness_N_per_m);
   const Stiffness least = softest(scene, soft, force_N);
@@ -120,6 +121,12 @@ void choose_models(Scene& scene) {
     }
   }
   scene.soft = std::move(soft);
+}
+
+double greatest_force_N(const Scene& scene) noexcept {
+  const double own = scene_limits(scene).max_force_N;
+  if (!(own > 0.0) || !std::isfinite(own)) return scene.safety.max_force_N;
+  return scene.max_force_given ? std::min(scene.safety.max_force_N, own) : own;
 }
 
 }  // namespace hybrid

@@ -19,4 +19,8 @@ namespace hybrid {
 // needed. Notes the result and its reason for each object whose model is not `voxels` (Scene::model_notes).
 void choose_models(Scene& scene);
 
+// Greatest force that a tick of the scene may give (N). `max_force` never raises it above the device's own
+// limit. A device without a limit (ideal) gets that of ForceLimits.
+[[nodiscard]] double greatest_force_N(const Scene& scene) noexcept;
+
 }  // namespace hybrid

@@ -5,7 +5,8 @@
 // not with the scene's extent. Three layers have one interface. Fixed rigid surfaces are rasterised
 // conservatively on load, with a bit per cell; exact queries go to the surfaces themselves. Moving rigid
 // bodies have such cells in their own frames, so the cells are never stale. Soft surface voxels are kept one
-// by one (an intrusive list per cell) and moved in O(1).
+// by one (an intrusive list per cell) and moved in O(1). hybrid/README.md, "The occupancy map", lists the
+// functions that ask the map.
 #pragma once
 
 #include <cstdint>

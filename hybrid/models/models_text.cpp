@@ -61,7 +61,8 @@ std::string joined(const std::vector<std::string>& parts, const char* nothing) {
   return text.empty() ? nothing : text;
 }
 
-// A figure that only a finger feels stands in brackets.
+// The names from told_apart_by(). "stiffness" stands in brackets if only a finger feels its error, not a hand
+// with a tool.
 std::string told_cell(const ModelRow& row, const ObjectModels& object) {
   std::vector<std::string> by = told_apart_by(row, object);
   std::ranges::replace(by, std::string(kByFinger), std::string("(stiffness)"));

@@ -155,6 +155,8 @@ void print_fault(const BlackBoxFile& kept) {
 
 int run(const RunCommand& command) {
   Scene scene = load_scene(command.scene);
+  const std::string text =
+      read_text(command.scene);  // now, because the file may be edited during the session
   if (!command.device.empty()) use_device(scene, command.device);
   Outputs outputs;
   ask_outputs(command, scene, outputs);
@@ -217,9 +219,9 @@ int run(const RunCommand& command) {
     save_trace(file, result.rows, pair_columns(*built.world, result.between));
   });
   outputs.write("recording", command.record, [&](const Path& file) {
-    save_recording(file, {std::filesystem::absolute(command.scene), read_text(command.scene), result.dt_s,
-                          scene_limits(scene), options.async_relaxation, result.state_hash, result.start_m,
-                          result.recording, result.edits});
+    save_recording(
+        file, {std::filesystem::absolute(command.scene), text, result.dt_s, scene_limits(scene),
+               options.async_relaxation, result.state_hash, result.start_m, result.recording, result.edits});
   });
   const nlohmann::ordered_json report =
       command.json.empty() && !paged ? nullptr : run_report(scene, built, result);

@@ -86,17 +86,21 @@ std::string file_bytes(const std::filesystem::path& file) {
 }
 
 PagePart picture_of(const DrawnScene& drawn, const SessionResult& result) {
-  if (!result.moment) return std::string("There is no picture, because nothing was touched.");
   try {
     const ScratchFolder scratch("page");
     const std::filesystem::path png = scratch.path() / "picture.png";
     save_picture(png, drawn, *result.moment);
     return PageFigure{
         .name = "picture",
-        .caption = fmt::format(
-            "The scene after {:.3f} s, when most was in contact. The arrow is the force on the hand.",
-            result.moment->t_s),
-        .alternative = "Drawing of the objects, the tool and the force at the moment of most contact",
+        .caption = result.contact_ticks > 0
+                       ? fmt::format("The scene after {:.3f} s, when most was in contact. The arrow is the "
+                                     "force on the hand.",
+                                     result.moment->t_s)
+                       : fmt::format("The scene after {:.3f} s. Nothing was touched in the session.",
+                                     result.moment->t_s),
+        .alternative = result.contact_ticks > 0
+                           ? "Drawing of the objects, the tool and the force at the moment of most contact"
+                           : "Drawing of the objects and the tool",
         .png = file_bytes(png)};
   } catch (const std::exception& why) {
     return "There is no picture: " + std::string(why.what());

@@ -10,8 +10,9 @@
 
 namespace hybrid {
 
-// The session for a person who was not there. `report` comes from run_report(). The result must have its rows
-// and its snapshot `moment`. Without OpenGL the page says why it has no picture.
+// The page of a session, for a reader who did not see it. `report` comes from run_report(). The session must
+// have been played with keep_rows and keep_picture (SessionOptions). Without OpenGL the page says why it has
+// no picture.
 Page run_page(const Scene& scene, const BuiltScene& built, const SessionResult& result,
               const nlohmann::ordered_json& report, const std::string& title);
 

@@ -224,8 +224,8 @@ void check_anchors(const TableReader& table, const Scene& scene, const SoftDescr
   if (!only_by_rigid || !scene.rigid.empty()) return;
   table.refuse("anchors",
                words(table.what(),
-                     " is held only where it is near to rigid objects, and the scene has none. A free soft "
-                     "object has no equilibrium force"),
+                     " is held only where it is near to rigid objects, and the scene has none. Such an "
+                     "object cannot balance the tool's force"),
                "add a face or a label to its anchors, or a [[rigid]] object");
 }
 

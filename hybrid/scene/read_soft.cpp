@@ -212,7 +212,7 @@ Anchors read_anchors(const TableReader& soft, const std::set<int>& known) {
   out.rigid_within_m = table.number("rigid_within", table.source().distance(), 0.0);
   if (out.faces.empty() && out.labels.empty() && out.rigid_within_m == 0.0) {
     soft.refuse("anchors",
-                words("nothing holds ", soft.what(), ". A free soft object has no equilibrium force"),
+                words("nothing holds ", soft.what(), ". Such an object cannot balance the tool's force"),
                 "hold it at a side, anchors = { faces = [\"-z\"] }, at labels, or where it touches bone "
                 "(rigid_within)");
   }

@@ -89,7 +89,8 @@ struct SlowRunOptions {
 ForceError compare_with_slow_run(const World& world, WorldState& state, const ForceCourse& course,
                                  const SlowRunOptions& options);
 
-// The reference in words: "the same path 5 times slower", and whether nested patches were wider.
+// The reference in words: "the same path 5 times slower". If it had nested patches, ", on patches twice as
+// wide" or ", on the same patches" follows.
 std::string reference_words(const ForceError& error);
 
 // The error in one sentence: 'felt as at rest', or the error while the tool moves and for how long it lasts

@@ -90,6 +90,16 @@ Scene recorded_scene(const Recording& recording) {
                   printable(file.string(), kLongestPath)));
 }
 
+// The device of the recording may not be connected now, and may be another one than the scene's. Its force
+// limit says whether it was ideal: only an ideal device has none. The other devices differ in their limits
+// alone.
+void use_recorded_device(Scene& scene, const device::DeviceLimits& limits) {
+  scene.opened_limits = limits;
+  if (std::isinf(limits.max_force_N) == is_ideal(scene)) return;
+  scene.real_device.reset();
+  scene.device_model = is_ideal(scene) ? device::DeviceModel::premium_1_5 : device::DeviceModel::ideal;
+}
+
 }  // namespace
 
 void save_recording(const std::filesystem::path& file, const Recording& recording) {
@@ -187,7 +197,7 @@ Recording load_recording(const std::filesystem::path& file) {
 ReplayResult replay(const Recording& recording, const Progress& progress) {
   set_flush_to_zero();
   Scene scene = recorded_scene(recording);
-  scene.opened_limits = recording.device;  // the device of the recording may not be connected now
+  use_recorded_device(scene, recording.device);
   if (1.0 / scene.rate_hz != recording.dt_s) scene.rate_hz = 1.0 / recording.dt_s;  // the driver's rate
   const BuiltScene built = build_scene(scene, progress);
   ReplayResult result;

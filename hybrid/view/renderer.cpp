@@ -374,8 +374,8 @@ void Renderer::draw(const DrawnScene& scene, const Snapshot& snapshot, const Cam
   glClear(s.view_number++ == 0 ? GL_DEPTH_BUFFER_BIT : GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   s.draw_soft();
 
-  // The depth of all that must not be hidden: soft objects, the arrow, and a disc a little larger than the
-  // tool. Copying the soft objects' depth costs less than drawing them again.
+  // The depth of all that must not be hidden: soft objects, the arrow, and a disc in front of the tool
+  // (place_tool_disc()). Copying the soft objects' depth costs less than drawing them again.
   s.copy_depth(where);
   glBindFramebuffer(GL_FRAMEBUFFER, s.targets.shown_frame);
   const glm::mat4 disc = place_tool_disc(scene, snapshot.proxy_m, camera, s.origin_m);

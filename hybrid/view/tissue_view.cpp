@@ -99,7 +99,7 @@ void TissueView::make_fields(std::size_t o, bool surface, bool slices) {
     object.nets[s].emplace(drawn.inside, object.slices[s].section.in_tissue);
 }
 
-// Slices show the scan as soon as it has been read.
+// With view_.grey, slices show the scan as soon as it has been read. Otherwise they show materials.
 void TissueView::paint(std::size_t o) {
   Object& object = objects_[o];
   if (object.slices.empty()) return;

@@ -34,9 +34,9 @@ glm::mat4 place_tool(const DrawnScene& scene, const glm::dvec3& at_m, const glm:
 // computed in doubles.
 glm::mat4 place_rigid(const RigidPlace& place, const glm::dvec3& origin_m);
 
-// Transform of the unit disc to a disc before the tool that faces the camera and is a little larger than the
-// tool. Rigid surfaces must not hide this disc. It lies nearer to the eye than the tool, so that a surface
-// below the tool, which hides nothing of it, is not in front of the disc.
+// Transform of the unit disc to a disc between the eye and the tool. The disc faces the camera, and its
+// radius is at least 1.8 times the tool's. Rigid surfaces must not hide this disc. It lies well in front of
+// the tool, so that a surface just below the tool is not in front of the disc.
 glm::mat4 place_tool_disc(const DrawnScene& scene, const glm::dvec3& at_m, const Camera& camera,
                           const glm::dvec3& origin_m);
 

@@ -232,7 +232,9 @@ class ContactSolver {
     }
     return system.solve(x_);
   }
-  // A body without contacts: (mass, inertia) · twist after the step = momentum; drag counts as mass.
+  // The equation of motion of one body without contacts. At the end of the step mass · velocity and
+  // inertia · spin equal `momentum`. `mass` and `inertia` include the drag over the step, and `momentum`
+  // includes the impulse of gravity.
   struct FreeTerm {
     double mass = 0.0;
     glm::dmat3 inertia{0.0};

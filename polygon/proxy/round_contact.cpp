@@ -12,8 +12,9 @@
 namespace polygon {
 namespace {
 
-// The reduced Hessian of the Lagrangian is kept at this fraction of the metric at least. Otherwise the model
-// has no minimum where the surface curves away as fast as the goal draws nearer.
+// The reduced Hessian of the Lagrangian is at least this fraction of the metric. Without this bound it may be
+// zero or negative, and then the model has no minimum. It is zero, for example, if the goal lies on the edge
+// and the metric is isotropic.
 constexpr double kMinCurvature = 1.0 / 64.0;
 
 // Two unit vectors perpendicular to n and to each other.

@@ -66,8 +66,8 @@ HYBRID_INLINE void double_path(RowValues& now, RowValues& limit) {
 
 // Finds the displacements that all paths within a row require. In each step the paths double their length:
 // one link, two, four, … Five steps suffice, where single links would take up to 31. Paths upwards and
-// downwards are independent, because a detour is never stronger than the direct path. Their steps are
-// interleaved, because a step waits for the one before it. `up`: limits between lanes n − 1 and n. `down`:
+// downwards are independent, because a detour is never stronger than the direct path. Their steps alternate:
+// one can run while the other waits for its last result. `up`: limits between lanes n − 1 and n. `down`:
 // limits between n and n + 1. False, with `required` undefined: no link requires a move.
 template <bool kRaise>
 HYBRID_INLINE bool all_paths(const RowValues& now, RowValues& up, RowValues& down, float margin,
@@ -401,7 +401,7 @@ HYBRID_INLINE SweepResult sweep_rows(const SweepTask& p, int most_visits, Moved*
     if (row.closed && p.y && has_z && has_x && label == y_label &&
         p.z.info[(k - 1) * step].label == z_label && UniformRows::one_label(p.x.info[k * step]) &&
         p.along_y.in[z_label] <= p.along_y.in[label] && p.along_y.back[z_label] <= p.along_y.back[label]) {
-      // Continues as long as rows are of the same kind and each of them moves.
+      // The loop goes on while the present row moved and the next row is of the same kind (UniformRows).
       UniformRows rows(p, label, z_label, p.x.info[k * step].label);
       bool done = false;
       while (sweep_uniform<kRaise>(p, rows, k, y, moved_out[k])) {

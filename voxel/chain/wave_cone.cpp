@@ -115,7 +115,7 @@ void ChainWave::write_cone(const WaveArgs& p, VoxelId apex, const ConeBox& box) 
     column.nearest = c == own_column ? at[0] % kRow : c > own_column ? 0 : kRow - 1;
     if (!write_plane(c, 0, box.steps[4] > 0 ? 1 : -1, ends)) return false;
     for (const int by : {1, -1}) {
-      ConeEnds here = ends;  // guess: each plane ends one row before the last one
+      ConeEnds here = ends;  // guess: each plane ends one row earlier than the plane before it
       for (int k = 1; k <= box.steps[by > 0 ? 4 : 5]; ++k) {
         here = fewer(here, 1);
         if (!write_plane(c, by * k, by, here)) break;
@@ -128,7 +128,7 @@ void ChainWave::write_cone(const WaveArgs& p, VoxelId apex, const ConeBox& box) 
   for (const int by : {1, -1}) {
     ConeEnds ends = own;
     for (int c = own_column + by; c >= low_column && c <= high_column; c += by) {
-      // Guess: the column ends about kRow rows before the last one.
+      // Guess: each plane ends kRow / 2 rows earlier than the far ends of the column before it.
       ends = fewer({ends.far_up, ends.far_down, ends.far_up, ends.far_down}, kRow / 2);
       if (!write_column(c, ends)) break;
     }

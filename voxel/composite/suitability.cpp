@@ -18,7 +18,7 @@ using composite::index;
 constexpr int kTrialHalfWidth = 10;  // of level 0 in trials
 constexpr double kConverges = 0.85;  // largest accepted mean convergence factor of displacements per cycle
 // Largest accepted error, as a share of the force with patches twice as wide: two just noticeable
-// differences.
+// differences of 7 %. hybrid/feel/just_noticeable.h has the same figures; this library must not include it.
 constexpr double kMaxForceError = 0.14;
 // Forces are scaled to a press as deep as this share of the object's smallest side. Errors are relative to
 // the force, or to 0.57 N if the force is smaller: 7 % of 0.57 N is 0.04 N, which a hand does not feel.

@@ -58,7 +58,7 @@ struct Displacement {
     joined = 5,
     joined_at_obstacle = 7,
   };
-  // Roles that row relaxation does not move.
+  // Does row relaxation leave voxels of this role where they are?
   [[nodiscard]] static bool stands(std::uint8_t role) noexcept { return (role & 1U) != 0; }
   [[nodiscard]] static bool in_block(std::uint8_t role) noexcept { return role >= joined; }
   [[nodiscard]] static bool at_obstacle(std::uint8_t role) noexcept {

@@ -322,7 +322,8 @@ void Lattice::fill_anchors(const LabelVolume& volume, const LatticeOptions& opti
   }
   if (anchored_count_ == 0) {
     throw std::invalid_argument(
-        "a free soft object has no equilibrium force: anchor a face, a label, or what touches bone");
+        "a soft object that is not held cannot balance the tool's force: anchor a face, a label, or what "
+        "touches bone");
   }
   anchor_blocks(lanes);
   list_anchors(lanes);

@@ -126,9 +126,9 @@ struct SetOut {
   // bits of the axes on which an active limit (row.stopped) holds a voxel that was asked to move
   unsigned stopped = 0;
 };
-// Adds `way` to a row regardless of its links; held, anchored and stopped voxels stay. On return `way` holds
-// the displacements before that. If any voxel is stopped, `refused` is the motion of stopped voxels in the
-// lanes of the span.
+// Adds `way` to the lanes of the span, whatever the links allow. Held, anchored and stopped voxels stay. On
+// return `way` holds the displacements before the call. If the row has stopped voxels (row.stopped),
+// `refused` is the motion that was asked of them; it is 0 in the span's other lanes.
 SetOut set_out_row(const LevelRow& row, const RowLimits& limits, LaneSpan span, unsigned sides,
                    RowVector& way, RowVector& refused) noexcept;
 // May links in a row, or to one of its sides, be beyond their limits?

@@ -34,9 +34,9 @@ constexpr std::size_t kNearRows = 3;
 // enough. Loads of bricks are not renewed meanwhile: they are of little use on tissue that moves far.
 constexpr float kJumped = 5.0F;
 constexpr int kCoarseFirstResults = 3;
-// Cycles on large boxes in each of these results.
+// Number of cycles on large boxes in each of the kCoarseFirstResults results.
 constexpr std::array<int, kCoarseFirstResults> kLargePatchCycles{3, 4, 2};
-// Number of Float8 per row that a whole cycle smooths and prolongs.
+// Number of Float8 per row that a cycle over the whole object smooths and prolongs.
 constexpr std::size_t kGroupsOfRow = 12;
 // Arrays of a row in a result: motion, and loads of bricks if there are any.
 std::size_t arrays_of(const Lattice& lattice) {

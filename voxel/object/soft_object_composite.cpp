@@ -8,6 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <string>
 
 #include "voxel/composite/grid.h"
 #include "voxel/object/soft_object.h"
@@ -50,7 +51,8 @@ void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::
 }  // namespace
 
 std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
-  if (lattice_->voxel_count() < kLeastOnGrid) return "it is small enough to be known voxel by voxel";
+  if (lattice_->voxel_count() < kLeastOnGrid)
+    return "it has fewer than " + std::to_string(kLeastOnGrid) + " voxels";
   assert(obstacles_.empty() && !moved_ever_);  // obstacles are set only after this call
   if (lattice_->max_spacing_m() > kFlat * lattice_->min_spacing_m()) return "its voxels are not cubes";
   // A ball touches tissue only where its slope is at most the steepest slope that links allow a surface.

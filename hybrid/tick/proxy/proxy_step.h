@@ -20,7 +20,8 @@ bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device
 // there are too many. Returns the distance from `point` up to which they are complete (m).
 double gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept;
 
-// The rigid part of the tick alone: map, contact, proxy, coupling. `bench rigid` times it.
+// The rigid part of the tick alone: map, contact, proxy, coupling. It has no friction, damping, texture or
+// limits (feel_stage.h, tick.h). `bench rigid` times it.
 struct RigidStep {
   glm::dvec3 proxy_m{0.0}, force_N{0.0};  // scene frame; the force on the hand, before any limit
   bool free = false;                      // nothing was near

@@ -117,10 +117,10 @@ class Sweeper {
     return glm::dot(q - target_, metric_ * (q - target_));
   }
 
-  // A ball rolls over an edge or a corner, and the plane there turns as it moves. A round step goes to the
+  // When a ball rolls over an edge or a corner, the separating plane turns with it. A round step goes to the
   // place where the minimum will be once the planes have turned (polygon/proxy/round_contact.h). The cost
-  // there is higher than at the minimum over the present planes. So the next step has to end at a lower cost
-  // than that minimum (round_step_paid()).
+  // there is higher than at the minimum over the present planes. If the next step does not bring the cost
+  // down to that of this minimum, the round step is undone (round_step_paid()).
   bool take_round_step(double still, double travel) noexcept {
     if (round_.waits > 0) --round_.waits;
     if (round_.waits > 0 || round_.taken || fraction_ != 1.0 || minimum_.active_count == 0 ||

@@ -14,8 +14,9 @@ struct Sweep {
   std::uint32_t work = 0;                // elements listed and planes renewed, weighted by their cost
 };
 
-// A sweep that has done this work ends on its way, outside everything, and goes on in the next tick (unit:
-// elements listed). The last survey or step may exceed the bound by the work of one neighbourhood.
+// Most work of one sweep (unit: elements listed). At this bound the sweep stops before it has arrived,
+// outside everything rigid, and the next tick continues it. The last survey or step may exceed the bound by
+// the work of one neighbourhood.
 inline constexpr std::uint32_t kMostSweepWork = 8192;
 
 // Moves at most `travel` from the feasible point `from` towards the minimum of (q − target)ᵀ A (q − target).

@@ -15,8 +15,8 @@
 namespace hybrid {
 namespace {
 
-// A facet faces the centre if the direction to its nearest point is within 45 degrees of its normal. At a
-// convex edge this leaves the centre free beside the edge.
+// A facet faces the centre if the line from the facet's nearest point to the centre is within 45 degrees of
+// the facet's normal. So beyond a convex edge the facet's half-space does not bound the centre.
 constexpr double kFaces = 0.70710678118654752;
 
 // A square between four neighbouring voxels: `corner`, and one step along each of two axes.

@@ -123,6 +123,28 @@ TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
   }
 }
 
+// `run --device`: the ideal device has neither passivity nor a limit of energy.
+TEST_F(RecordingFile, TheReplayHasTheDeviceThatWasUsedNotTheScenes) {
+  using enum device::DeviceModel;
+  struct Case {
+    const char* written;
+    device::DeviceModel used;
+  };
+  for (const Case& c : {Case{"[device]\nmodel = \"touch\"\n[safety]\npassivity = true\n", ideal},
+                        Case{"[device]\nmodel = \"ideal\"\n", touch}}) {
+    SCOPED_TRACE(c.written);
+    const auto file = write("other.toml", read(small_scene()) + c.written);
+    hybrid::Scene scene = hybrid::load_scene(file);
+    scene.device_model = c.used;
+    hybrid::BuiltScene built = hybrid::build_scene(scene);
+    const hybrid::SessionResult result = hybrid::run_session(scene, built, {.keep_rows = false});
+    hybrid::save_recording(folder_ / "a.rec", recording_of(file, scene, result, false));
+    const hybrid::ReplayResult again = hybrid::replay(hybrid::load_recording(folder_ / "a.rec"), {});
+    EXPECT_TRUE(again.equal) << "parts at tick " << again.first_difference;
+    EXPECT_EQ(again.state_hash, result.state_hash);
+  }
+}
+
 // ---- edits ----
 
 std::vector<hybrid::Edit> some_edits(const hybrid::World& world) {

@@ -5,8 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <glm/geometric.hpp>
 
+#include "hybrid/build/choose_model.h"
 #include "hybrid/session/session.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 
@@ -37,6 +39,25 @@ class Edits : public tests::SceneFile {
     return hybrid::run_session(loaded, built, options);
   }
 };
+
+TEST_F(Edits, TheGreatestForceIsNeverAboveTheDevices) {
+  const std::string object = tests::block + "[path]\nkind = \"press\"\nfrom = [0, 0, 20]\nto = [0, 0, 4]\n";
+  const auto most = [&](const std::string& device, const std::string& max_force) {
+    const hybrid::Scene loaded = load("format = 1\n[device]\nmodel = \"" + device + "\"\n[safety]\n" +
+                                      max_force + "[tool]\nradius = 2\nstiffness = 800\n" + object);
+    const hybrid::BuiltScene built = hybrid::build_scene(loaded);
+    EXPECT_EQ(built.world->limits.max_force_N, hybrid::greatest_force_N(loaded));
+    const double least_above = std::nextafter(hybrid::greatest_force_N(loaded), 1e9);
+    EXPECT_FALSE(hybrid::apply_edit(*built.world, *built.state,
+                                    {0, Edit::kTool, hybrid::EditedQuantity::max_force, least_above}));
+    return built.world->limits.max_force_N;
+  };
+  EXPECT_EQ(most("touch", ""), 3.3);
+  EXPECT_EQ(most("touch", "max_force = 2\n"), 2.0);
+  EXPECT_EQ(most("touch", "max_force = 10000\n"), 3.3);
+  EXPECT_EQ(most("ideal", "max_force = 10000\n"), 1e4) << "it has no limit of its own";
+  EXPECT_EQ(most("ideal", ""), device::ForceLimits{}.max_force_N);
+}
 
 TEST_F(Edits, BeforeTheFirstTickTheyGiveTheScenesThatSayTheSame) {
   const std::uint64_t plain = felt(scene("stiffness = 800\n", kFeel)).state_hash;
