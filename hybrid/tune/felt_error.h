@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The difference between two sessions along one motion, in JND. Only ticks count in which at least one of the
-// two sessions feels something soft.
+// two sessions feels something soft, and in which the reference is at rest.
 #pragma once
 
 #include <cstddef>

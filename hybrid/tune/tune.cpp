@@ -85,16 +85,14 @@ class Search {
   }
 
   void plan(const std::vector<Setting>& settings) {
-    split_ = truth_split(as_read_, result_.objects, result_.notes);
-    // Runs for the truth and its error, and for the truth of the confirming motion.
-    progress_.plan(truth_weight(split_) + slow_weight(1.0 / split_, kTruthSlower) / kOtherSpeed);
+    // The truth along the motion and along the confirming one.
+    progress_.plan(truth_weight(truth_plan()) + truth_course_weight(truth_plan()));
     for (const Setting& setting : settings)
       progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
   }
 
   void find_truth() {
-    const TruthPlan plan = truth_plan();
-    result_.truth = measure_truth(plan, motion_, cache_, step_);
+    result_.truth = measure_truth(truth_plan(), motion_, cache_, step_);
     std::size_t felt = 0;
     for (const CourseTick& tick : result_.truth.course) felt += tick.soft ? 1 : 0;
     if (felt == 0) {
@@ -114,7 +112,7 @@ class Search {
     return {.as_read = as_read_,
             .objects = result_.objects,
             .names = names_,
-            .split = split_,
+            .quick = options_.quick,
             .floor_N = result_.floor_N,
             .dt_s = dt_s()};
   }
@@ -342,8 +340,7 @@ class Search {
   void confirm_on(const Motion& motion, const std::string& words) {
     Confirmation& confirmation = result_.confirmation;
     confirmation.motion = words;
-    const ForceCourse truth =
-        slow_course(truth_plan(), result_.truth.grid, motion, words, kTruthSlower, cache_, step_);
+    const ForceCourse truth = truth_course(truth_plan(), motion, words, cache_, step_).course;
     const auto felt = [](const ForceCourse& course) {
       return static_cast<double>(std::ranges::count_if(course, &CourseTick::soft));
     };
@@ -371,7 +368,6 @@ class Search {
   Scene own_;
   Motion motion_;
   std::vector<std::string> names_;
-  int split_ = kTruthSplit;
   std::uint64_t part_ticks_ = 1;
   std::vector<Trial> trials_;
   struct Fitted {

@@ -99,6 +99,17 @@ std::string doubt_about_cost(const TuneResult& result) {
   return text;
 }
 
+// A property of the scene that no setting changes, if it can be felt: its voxels are wide for this path.
+std::string about_scene(const TuneResult& result) {
+  const Truth& truth = result.truth;
+  if (!truth.spacing || truth.spacing->worst_jnd() < result.bounds.error_jnd) return {};
+  return fmt::format(
+      " Whatever the setting, the scene's own voxels ({}) differ from ever finer ones by about {:.1f} JND: "
+      "if "
+      "the tissue is known more finely, give the scene a smaller spacing, and tune it again.",
+      truth.words, truth.spacing->worst_jnd());
+}
+
 bool voxels_left(const Setting& setting) {
   return std::ranges::any_of(setting.objects, [](const ObjectSetting& one) { return !one.proxy; });
 }
@@ -197,8 +208,7 @@ std::string left_out_words(const TuneResult& result) {
 
 std::string truth_in_words(const TuneResult& result) {
   return fmt::format(
-             "errors: p99 of the difference from the truth in each tick in which something soft is felt, on "
-             "an "
+             "errors: p99 of the difference from the truth in its poses, where something soft is felt, on an "
              "ideal device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n",
              100.0 * kJndShare, result.floor_N) +
          truth_words(result.truth);
@@ -273,7 +283,7 @@ std::string tune_verdict(const TuneResult& result) {
   }
   if (!result.choice.any_sound) text += " Every setting had a fault.";
   return truth_warning(result) + text + about_proxies(result) + doubt_about_error(result) +
-         doubt_about_cost(result);
+         doubt_about_cost(result) + about_scene(result);
 }
 
 std::string tune_reason(const TuneResult& result) {
@@ -283,9 +293,10 @@ std::string tune_reason(const TuneResult& result) {
                             1e3 * s.match->depth_m, s.match->force_N)
               : "";
   return fmt::format(
-      "{}: {} (p99, the truth uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, {:.0f} us){}.",
-      s.words, in_words(s.error), result.truth.error_jnd(), s.tick_us.p999, rule_name(result.choice.rule),
-      result.bounds.error_jnd, result.bounds.budget_us, fitted);
+      "{}: {} (p99, from {} at rest, itself uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, "
+      "{:.0f} us){}.",
+      s.words, in_words(s.error), result.truth.words, result.truth.error_jnd(), s.tick_us.p999,
+      rule_name(result.choice.rule), result.bounds.error_jnd, result.bounds.budget_us, fitted);
 }
 
 std::string tune_words(const TuneResult& result) {
