@@ -21,4 +21,9 @@ SettingError felt_error(const ForceCourse& course, const ForceCourse& reference,
   return {moving.result(), still.result()};
 }
 
+SettingError worse(const SettingError& a, const SettingError& b) {
+  return {a.moving.p99_jnd >= b.moving.p99_jnd ? a.moving : b.moving,
+          a.still.p99_jnd >= b.still.p99_jnd ? a.still : b.still};
+}
+
 }  // namespace hybrid

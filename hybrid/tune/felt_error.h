@@ -19,6 +19,9 @@ struct SettingError {
   }
 };
 
+// The worse of two errors by their p99, for each kind of ticks.
+SettingError worse(const SettingError& a, const SettingError& b);
+
 // `ticks`: number of ticks, from the start, that count. The JND is that of the reference's force.
 SettingError felt_error(const ForceCourse& course, const ForceCourse& reference, double floor_N, double dt_s,
                         std::size_t ticks = static_cast<std::size_t>(-1));

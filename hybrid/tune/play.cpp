@@ -65,16 +65,17 @@ bool moves(const ForceCourse& course, std::size_t t, double dt_s) {
 
 class OtherPath final : public device::Path {
  public:
-  OtherPath(std::shared_ptr<const device::Path> path, const glm::dvec3& offset_m)
-      : path_(std::move(path)), offset_m_(offset_m) {}
+  OtherPath(std::shared_ptr<const device::Path> path, double speed, const glm::dvec3& offset_m)
+      : path_(std::move(path)), speed_(speed), offset_m_(offset_m) {}
   [[nodiscard]] glm::dvec3 position(double t_s) const noexcept override {
-    return path_->position(kOtherSpeed * t_s) + offset_m_;
+    return path_->position(speed_ * t_s) + offset_m_;
   }
-  [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s() / kOtherSpeed; }
+  [[nodiscard]] double duration_s() const noexcept override { return path_->duration_s() / speed_; }
   [[nodiscard]] const std::vector<std::string>& notes() const noexcept override { return path_->notes(); }
 
  private:
   std::shared_ptr<const device::Path> path_;
+  double speed_;
   glm::dvec3 offset_m_;
 };
 
@@ -90,8 +91,8 @@ Motion scene_motion(const Scene& scene) {
   return motion_along(scene_path(scene), scene.rate_hz);
 }
 
-Motion other_motion(const Motion& motion, double rate_hz, const glm::dvec3& offset_m) {
-  return motion_along(std::make_shared<OtherPath>(motion.path, offset_m), rate_hz);
+Motion other_motion(const Motion& motion, double rate_hz, double speed, const glm::dvec3& offset_m) {
+  return motion_along(std::make_shared<OtherPath>(motion.path, speed, offset_m), rate_hz);
 }
 
 Played play_setting(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,

@@ -58,9 +58,7 @@ struct RestCourse {
 RestCourse play_to_rest(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
                         const Poses& poses, int slower, const Progress& progress);
 
-// The same motion, 1.5 times faster and moved by `offset_m`. It serves to confirm the choice, because no
-// setting was chosen on it.
-Motion other_motion(const Motion& motion, double rate_hz, const glm::dvec3& offset_m);
-inline constexpr double kOtherSpeed = 1.5;  // factor on the speed of the motion
+// The same motion, `speed` times faster and moved by `offset_m`.
+Motion other_motion(const Motion& motion, double rate_hz, double speed, const glm::dvec3& offset_m);
 
 }  // namespace hybrid

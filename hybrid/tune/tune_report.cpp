@@ -209,8 +209,11 @@ std::string left_out_words(const TuneResult& result) {
 std::string truth_in_words(const TuneResult& result) {
   return fmt::format(
              "errors: p99 of the difference from the truth in its poses, where something soft is felt, on an "
-             "ideal device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n",
-             100.0 * kJndShare, result.floor_N) +
+             "ideal device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N); {}\n",
+             100.0 * kJndShare, result.floor_N,
+             result.second_motion.empty()
+                 ? "on one motion, as the path moved sideways loses its contact"
+                 : "the worse of two motions: the path, and " + result.second_motion) +
          truth_words(result.truth);
 }
 
@@ -317,6 +320,7 @@ nlohmann::ordered_json tune_json(const TuneResult& result) {
                  {"period_us", result.period_us}};
   j["jnd"] = {{"share", kJndShare}, {"floor_N", result.floor_N}};
   j["truth"] = to_json(result.truth);
+  j["second_motion"] = result.second_motion;
   j["chosen"] = result.settings[result.chosen].words;
   j["rule"] = rule_name(result.choice.rule);
   j["front"] = nlohmann::ordered_json::array();
