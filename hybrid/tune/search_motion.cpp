@@ -37,7 +37,7 @@ SearchMotion moved_motion(const SearchMotion& own, const Scene& scene, double si
   force = glm::abs(force);
   glm::dvec3 axis(0.0);
   axis[force.x <= std::min(force.y, force.z) ? 0 : force.y <= force.z ? 1 : 2] = 1.0;
-  const glm::dvec3 offset_m = side * kSideways * scene.tool.radius_m * axis;
+  const glm::dvec3 offset_m = side * kSideways * scene.tool.radius_m * axis + glm::dvec3(0.0);  // no -0
   const std::string faster = speed == 1.0 ? "" : fmt::format("{} times faster, ", speed);
   return {.motion = other_motion(own.motion, scene.rate_hz, speed, offset_m),
           .words = fmt::format("the path {}moved by ({:.3g}, {:.3g}, {:.3g}) mm", faster, 1e3 * offset_m.x,

@@ -117,14 +117,15 @@ bool voxels_left(const Setting& setting) {
 // Is a proxy enough? If not, how far off is the nearest one?
 std::string about_proxies(const TuneResult& result) {
   const TunedSetting& chosen = result.settings[result.chosen];
+  const bool enough = !voxels_left(chosen.setting) && result.choice.rule == ChoiceRule::cheapest_accurate;
+  const std::string said = enough ? " A proxy is enough here: no voxels are needed." : "";
   if (chosen.match) {
     return fmt::format(
         "{} Its coupling is the tool's, so it is felt at every object. It fits depths up to {:.2f} mm, as on "
         "this path.",
-        voxels_left(chosen.setting) ? "" : " A proxy is enough here: no voxels are needed.",
-        1e3 * chosen.match->depth_m);
+        said, 1e3 * chosen.match->depth_m);
   }
-  if (!voxels_left(chosen.setting)) return " A proxy is enough here: no voxels are needed.";
+  if (!voxels_left(chosen.setting)) return said;
   const TunedSetting* nearest = nullptr;
   for (const TunedSetting& s : result.settings) {
     if (s.match && (nearest == nullptr || s.error.worst_jnd() < nearest->error.worst_jnd())) nearest = &s;
@@ -304,12 +305,17 @@ std::string tune_reason(const TuneResult& result) {
 
 std::string tune_words(const TuneResult& result) {
   std::string text = tune_verdict(result) + "\n\n" + table_of_front(result) + "\n";
-  text += truth_in_words(result) + confirmation_words(result) + left_out_words(result);
+  return text + left_out_words(result) + tune_legend(result) + "*: chosen\n";
+}
+
+std::string tune_legend(const TuneResult& result) {
+  std::string text = truth_in_words(result) + confirmation_words(result);
   for (const std::string& note : result.notes) text += "note: " + note + "\n";
-  return text + fmt::format(
-                    "ticks: each one's median over the passes, whose order alternates; *: chosen. The search "
-                    "took {:.0f} s\n",
-                    result.seconds);
+  return text +
+         fmt::format(
+             "ticks: each one's median over the passes, whose order alternates; the search took {:.0f} "
+             "s\n",
+             result.seconds);
 }
 
 nlohmann::ordered_json tune_json(const TuneResult& result) {

@@ -19,6 +19,7 @@
 #include "hybrid/session/session.h"
 #include "hybrid/tick/tick.h"
 #include "hybrid/tune/edit_scene.h"
+#include "hybrid/tune/tune_page.h"
 #include "hybrid/tune/tune_plot.h"
 #include "hybrid/tune/tune_report.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
@@ -188,8 +189,12 @@ TEST_F(Tune, ASearchThatWasEndedGoesOnAndGivesTheSame) {
   const auto json = hybrid::tune_json(resumed);
   EXPECT_EQ(json.at("settings").size(), resumed.settings.size());
   EXPECT_EQ(json.at("front").size(), resumed.front.size());
-  hybrid::save_tune_plot(folder_ / "plot.svg", resumed, "a < b");
-  EXPECT_GT(std::filesystem::file_size(folder_ / "plot.svg"), 2000U);
+  EXPECT_GT(hybrid::tune_svg(resumed, "a < b").size(), 2000U);
+  const hybrid::Page page = hybrid::tune_page(resumed, "a < b");
+  EXPECT_EQ(page.verdict, hybrid::tune_verdict(resumed));
+  const auto whole = std::ranges::count_if(resumed.settings, &hybrid::TunedSetting::whole);
+  EXPECT_EQ(hybrid::page_json(page)["tables"][0]["rows"].size(), static_cast<std::size_t>(whole));
+  EXPECT_THAT(hybrid::to_html(page), HasSubstr("a &lt; b"));
 }
 
 TEST_F(Tune, AnotherSceneAnotherFileAndADamagedRecordAreNotFound) {
@@ -231,6 +236,20 @@ TEST_F(Tune, AVerdictSaysFirstThatTheTruthIsTooUncertainForIt) {
   EXPECT_THAT(hybrid::tune_verdict(one_setting(4.8, 0.5)),
               testing::StartsWith("The truth is itself uncertain by 4.80 JND, so no setting is shown"));
   EXPECT_THAT(hybrid::tune_verdict(one_setting(0.2, 1.9)), HasSubstr("off by 1.90 JND, more than the bound"));
+}
+
+TEST_F(Tune, AVerdictKeepsTheSceneApartFromItsSetting) {
+  TuneResult result = one_setting(0.2, 0.5);
+  EXPECT_THAT(hybrid::tune_verdict(result), testing::Not(HasSubstr("the scene's own voxels")));
+  result.truth.spacing = hybrid::SettingError{};
+  result.truth.spacing->still = {.ticks = 10, .p99_jnd = 2.3};
+  EXPECT_THAT(hybrid::tune_verdict(result), testing::StartsWith("2 mm six-link"));
+  EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("differ from ever finer ones by about 2.3 JND"));
+  // The most accurate setting in time is not called enough.
+  result.settings[0].setting.objects = {{.object = "block", .proxy = true}};
+  EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("A proxy is enough here"));
+  result.choice.rule = hybrid::ChoiceRule::most_accurate_in_time;
+  EXPECT_THAT(hybrid::tune_verdict(result), testing::Not(HasSubstr("is enough")));
 }
 
 // A shallow press into soft gel, and then, if `rigid`, one onto a rigid box beside it.
