@@ -210,11 +210,10 @@ std::string left_out_words(const TuneResult& result) {
 std::string truth_in_words(const TuneResult& result) {
   return fmt::format(
              "errors: p99 of the difference from the truth in its poses, where something soft is felt, on an "
-             "ideal device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N); {}\n",
-             100.0 * kJndShare, result.floor_N,
-             result.second_motion.empty()
-                 ? "on one motion, as the path moved sideways loses its contact"
-                 : "the worse of two motions: the path, and " + result.second_motion) +
+             "ideal device\n  {}\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n",
+             result.second_motion.empty() ? "on one motion, as the path moved sideways loses its contact"
+                                          : "the worse of two motions: the path, and " + result.second_motion,
+             100.0 * kJndShare, result.floor_N) +
          truth_words(result.truth);
 }
 
