@@ -189,7 +189,7 @@ Truth measure_truth(const TruthPlan& plan, const Motion& motion, const Evaluatio
   truth.rest = richardson(felt_error(own.halfway, own.course, plan.floor_N, plan.dt_s), 2.0, kRestOrder);
   truth.course = std::move(own.course);
   truth.words = words_of(plan, truth.grid);
-  truth.key = fmt::format("{}{}", as_toml(truth.grid.setting), motion.ticks);
+  truth.key = fmt::format("{}{} {}", as_toml(truth.grid.setting), motion.ticks, poses_of(plan));
   truth.not_measured = too_many_voxels(plan);
   if (!truth.not_measured.empty()) return truth;
   const auto fewer = [&](const Progress&) {

@@ -139,6 +139,10 @@ TEST_F(Tune, ATruthHasTheScenesOwnShape) {
   }
 }
 
+hybrid::TruthPlan plan_of(const Scene& scene, const std::vector<hybrid::TunableObject>& objects, bool quick) {
+  return {.as_read = scene, .objects = objects, .names = kBlock, .quick = quick};
+}
+
 void expect_equal(const TuneResult& a, const TuneResult& b, bool times) {
   ASSERT_EQ(a.settings.size(), b.settings.size());
   for (std::size_t n = 0; n < a.settings.size(); ++n) {
@@ -177,6 +181,12 @@ TEST_F(Tune, ASearchThatWasEndedGoesOnAndGivesTheSame) {
   EXPECT_GT(at_end, at_stop);
   expect_equal(resumed, hybrid::tune(scene, options), true);
   EXPECT_EQ(kept(), at_end);
+  const auto objects = hybrid::tunable_objects(scene);
+  const Motion motion = hybrid::scene_motion(hybrid::with_setting(scene, hybrid::own_setting(objects)));
+  const hybrid::Step step = [](const std::string&, double, const auto& work) { work({}); };
+  // A search with more poses takes no error of this one.
+  EXPECT_NE(hybrid::measure_truth(plan_of(scene, objects, true), motion, {{}, scene}, step).key,
+            hybrid::measure_truth(plan_of(scene, objects, false), motion, {{}, scene}, step).key);
   options.cache.clear();
   expect_equal(resumed, hybrid::tune(scene, options), false);
 
