@@ -58,11 +58,6 @@ SessionOptions session_options(const Scene& scene, const Motion& motion, const P
   return options;
 }
 
-bool moves(const ForceCourse& course, std::size_t t, double dt_s) {
-  return t == 0 || t >= course.size() ||
-         glm::distance(course[t].device_m, course[t - 1].device_m) > kStill_m_per_s * dt_s;
-}
-
 class OtherPath final : public device::Path {
  public:
   OtherPath(std::shared_ptr<const device::Path> path, double speed, const glm::dvec3& offset_m)
@@ -112,28 +107,34 @@ Played play_setting(const Scene& scene, const std::vector<std::string>& objects,
   return played;
 }
 
-Poses poses_along(const ForceCourse& course, double dt_s, int most) {
+Poses poses_along(const ForceCourse& course, double dt_s, bool bodies_move, int most) {
   const auto around = static_cast<std::size_t>(std::lround(kAround_s / dt_s));
-  Poses poses{std::vector<bool>(course.size(), false), std::vector<bool>(course.size(), false)};
-  std::size_t moving = 0;
+  const std::vector<bool> none(course.size(), false);
+  Poses poses{none, none, none};
   for (std::size_t t = 0; t < course.size(); ++t) {
     if (!course[t].soft) continue;
     for (std::size_t n = t - std::min(t, around); n < std::min(t + around + 1, course.size()); ++n)
       poses.near[n] = true;
   }
+  std::size_t moving = 0;
+  bool moved = true;
   for (std::size_t t = 0; t < course.size(); ++t) {
-    poses.held[t] = poses.near[t] && (moves(course, t, dt_s) || moves(course, t - 1, dt_s));
-    moving += poses.held[t] && moves(course, t, dt_s) ? 1 : 0;
+    const bool moves = bodies_move || t == 0 ||
+                       glm::distance(course[t].device_m, course[t - 1].device_m) > kStill_m_per_s * dt_s;
+    poses.held[t] = poses.near[t] && (moves || moved);
+    poses.stops[t] = poses.held[t] && !moves;
+    moving += poses.held[t] && moves ? 1 : 0;
+    moved = moves;
   }
   const auto limit = static_cast<std::size_t>(most);
-  return every_nth(poses, course, dt_s, std::max<std::size_t>(1, (moving + limit - 1) / limit));
+  return every_nth(poses, std::max<std::size_t>(1, (moving + limit - 1) / limit));
 }
 
-Poses every_nth(const Poses& poses, const ForceCourse& course, double dt_s, std::size_t n) {
+Poses every_nth(const Poses& poses, std::size_t n) {
   Poses fewer = poses;
   std::size_t moving = 0;
-  for (std::size_t t = 0; t < course.size(); ++t) {
-    if (fewer.held[t] && moves(course, t, dt_s)) fewer.held[t] = moving++ % n == 0;
+  for (std::size_t t = 0; t < fewer.held.size(); ++t) {
+    if (fewer.held[t] && !fewer.stops[t]) fewer.held[t] = moving++ % n == 0;
   }
   return fewer;
 }
@@ -151,7 +152,6 @@ class RestPlayer {
         dt_s_(1.0 / scene.rate_hz),
         bits_(contact_bits(*built_.world, objects)),
         floor_N_(jnd_floor_N(scene)) {
-    for (const RigidObject& object : built_.world->rigid) bodies_move_ |= object.motion.moves();
     device_m_ = motion.path->position(0.0);
     begin_session(scene, *built_.world, *built_.state, device_m_);
     start_async_relaxation(*built_.state, Arrival::at_once);
@@ -166,16 +166,16 @@ class RestPlayer {
       if (t % kReportEvery == 0) say(t, poses.held.size());
       const glm::dvec3 to_m = motion_.path->position(static_cast<double>(t) * dt_s_);
       const bool still = t > 0 && glm::distance(to_m, device_m_) <= kStill_m_per_s * dt_s_;
-      rests = rests && still && !bodies_move_;
+      rests = rests && still;
       move(to_m, touches() && !rests ? slower : 1);
       if (poses.held[t]) {
         hold();
-        rests = true;
+        rests = poses.stops[t];
       }
-      const bool away = !poses.near[t] && !touches();
-      played.course.push_back({device_m_, force_N(), touches(), rests || away});
+      const bool away = !poses.near[t] && !touches(), at_rest = poses.held[t] || rests;
+      played.course.push_back({device_m_, force_N(), touches(), at_rest || away});
       played.halfway.push_back(played.course.back());
-      if (rests) played.halfway.back().force_N = halfway_N_;
+      if (at_rest) played.halfway.back().force_N = halfway_N_;
     }
     return played;
   }
@@ -222,7 +222,6 @@ class RestPlayer {
   double dt_s_;
   std::uint32_t bits_;
   double floor_N_;
-  bool bodies_move_ = false;
   glm::dvec3 device_m_{0.0};
   TickResult felt_{};
   glm::dvec3 halfway_N_{0.0};  // of the last pose, after half of its hold

@@ -34,15 +34,18 @@ struct Played {
 Played play_setting(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
                     const Progress& progress);
 
-// The ticks in which a motion is stopped, and those near a contact. All have an entry for each tick.
+// The ticks in which a motion is stopped. All have an entry for each tick.
 struct Poses {
-  std::vector<bool> held, near;
+  std::vector<bool> held;
+  std::vector<bool> near;   // near a contact
+  std::vector<bool> stops;  // the first tick of a stop, after which all stay at rest
 };
-// Poses of a motion that a session felt as `course`: of the ticks near a contact in which the device moves at
-// most `most`, evenly spread, and the first tick of each stop there.
-Poses poses_along(const ForceCourse& course, double dt_s, int most);
-// Every `n`-th of them, and the first tick of each stop.
-Poses every_nth(const Poses& poses, const ForceCourse& course, double dt_s, std::size_t n);
+// Poses of a motion that a session felt as `course`: of the ticks near a contact in which something moves at
+// most `most`, evenly spread, and the stops there. `bodies_move`: rigid bodies move even if the device does
+// not, so that there are no stops.
+Poses poses_along(const ForceCourse& course, double dt_s, bool bodies_move, int most);
+// Every `n`-th of them, and all stops.
+Poses every_nth(const Poses& poses, std::size_t n);
 
 // Forces of tissue at rest.
 struct RestCourse {

@@ -35,7 +35,8 @@ nlohmann::json course_json(const RestCourse& played) {
     const glm::dvec3& half_N = played.halfway[t].force_N;
     j.push_back({c.device_m.x, c.device_m.y, c.device_m.z, c.force_N.x, c.force_N.y, c.force_N.z,
                  c.soft ? 1.0 : 0.0, c.at_rest ? 1.0 : 0.0, half_N.x, half_N.y, half_N.z,
-                 played.poses.held[t] ? 1.0 : 0.0, played.poses.near[t] ? 1.0 : 0.0});
+                 played.poses.held[t] ? 1.0 : 0.0, played.poses.near[t] ? 1.0 : 0.0,
+                 played.poses.stops[t] ? 1.0 : 0.0});
   }
   return j;
 }
@@ -43,12 +44,13 @@ nlohmann::json course_json(const RestCourse& played) {
 RestCourse course_from(const nlohmann::json& j) {
   RestCourse played;
   for (const auto& row : j) {
-    const auto t = row.get<std::array<double, 13>>();
+    const auto t = row.get<std::array<double, 14>>();
     played.course.push_back({{t[0], t[1], t[2]}, {t[3], t[4], t[5]}, t[6] != 0.0, t[7] != 0.0});
     played.halfway.push_back(played.course.back());
     played.halfway.back().force_N = {t[8], t[9], t[10]};
     played.poses.held.push_back(t[11] != 0.0);
     played.poses.near.push_back(t[12] != 0.0);
+    played.poses.stops.push_back(t[13] != 0.0);
   }
   return played;
 }
@@ -121,7 +123,11 @@ std::string words_of(const TruthPlan& plan, const TruthGrid& grid) {
 // The poses along a motion, from a session at normal speed.
 Poses find_poses(const TruthPlan& plan, const Motion& motion, const Progress& progress) {
   const Scene scene = as_reference(plan.as_read, at_scale(plan.objects, 1.0));
-  return poses_along(play_setting(scene, plan.names, motion, progress).course, plan.dt_s, poses_of(plan));
+  const bool bodies_move = std::ranges::any_of(scene.rigid, [](const RigidDescription& rigid) {
+    return !std::holds_alternative<std::monostate>(rigid.motion);
+  });
+  return poses_along(play_setting(scene, plan.names, motion, progress).course, plan.dt_s, bodies_move,
+                     poses_of(plan));
 }
 
 // The course on this grid, from the cache if it is there. `at`: finds the poses; `count`: about so many.
@@ -192,9 +198,7 @@ Truth measure_truth(const TruthPlan& plan, const Motion& motion, const Evaluatio
   truth.key = fmt::format("{}{} {}", as_toml(truth.grid.setting), motion.ticks, poses_of(plan));
   truth.not_measured = too_many_voxels(plan);
   if (!truth.not_measured.empty()) return truth;
-  const auto fewer = [&](const Progress&) {
-    return every_nth(own.poses, truth.course, plan.dt_s, kPosesApart);
-  };
+  const auto fewer = [&](const Progress&) { return every_nth(own.poses, kPosesApart); };
   const auto apart = [&](const TruthGrid& grid) {
     return course_on(plan, grid, motion, "", poses_of(plan) / kPosesApart, kSlowerApart, fewer, cache, step)
         .course;

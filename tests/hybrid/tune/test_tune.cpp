@@ -67,7 +67,7 @@ TEST_F(Tune, ATruthIsAtRestInItsPoses) {
   const Scene scene = hybrid::on_ideal_device(hybrid::load_scene(gel("a.toml", "2")));
   const Motion motion = hybrid::scene_motion(scene);
   const auto session = hybrid::play_setting(scene, kBlock, motion, {}).course;
-  const hybrid::Poses poses = hybrid::poses_along(session, 1e-3, 12);
+  const hybrid::Poses poses = hybrid::poses_along(session, 1e-3, false, 12);
   const auto truth = hybrid::play_to_rest(scene, kBlock, motion, poses, 10, {});
   EXPECT_EQ(hybrid::felt_error(truth.course,
                                hybrid::play_to_rest(scene, kBlock, motion, poses, 10, {}).course, 0.04, 1e-3)
@@ -96,7 +96,7 @@ TEST_F(Tune, PosesLieInContactsAndWhereTheDeviceStops) {
     const double moved = t < 200 ? t : t < 250 ? 200 : t - 50;
     course.push_back({.device_m = {5e-4 * moved, 0.0, 0.0}, .soft = t >= 100 && t < 250});
   }
-  const hybrid::Poses poses = hybrid::poses_along(course, 1e-3, 10);
+  const hybrid::Poses poses = hybrid::poses_along(course, 1e-3, false, 10);
   int moving = 0, stops = 0;
   for (std::size_t t = 0; t < course.size(); ++t) {
     EXPECT_EQ(poses.near[t], t >= 80 && t < 270) << t;
@@ -107,7 +107,11 @@ TEST_F(Tune, PosesLieInContactsAndWhereTheDeviceStops) {
   EXPECT_LE(moving, 10);
   EXPECT_GE(moving, 7);
   EXPECT_EQ(stops, 1);
-  EXPECT_EQ(std::ranges::count(hybrid::every_nth(poses, course, 1e-3, 100).held, true), 2);
+  EXPECT_EQ(std::ranges::count(hybrid::every_nth(poses, 100).held, true), 2);
+  // Bodies that move may move the tissue at any time.
+  const hybrid::Poses moved = hybrid::poses_along(course, 1e-3, true, 10);
+  EXPECT_EQ(std::ranges::count(moved.stops, true), 0);
+  EXPECT_EQ(std::ranges::count(moved.held, true), 10);
 }
 
 // A divided voxel is the same body, so surfaces, materials and anchors stay in place.
