@@ -128,7 +128,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"plot", {"session", "view"}},
         {"page", {"plot"}},
         {"compare", {"session", "view"}},
-        {"tune", {"compare", "plot"}},
+        {"tune", {"compare", "page"}},
         {"models", {"tune"}},
         {"compose", {"session", "view"}},
         {"window", {"view"}},

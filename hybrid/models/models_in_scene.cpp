@@ -189,22 +189,23 @@ class ModelsRun {
     constexpr double kUsualRows = 7.0;  // of an object
     progress_.plan(static_cast<double>(compared) * kUsualRows * static_cast<double>(kPasses));
     if (!touches_soft()) return;
-    split_ = truth_split(scene_, objects_, result_.notes);
-    progress_.plan(truth_weight(split_));
+    progress_.plan(truth_weight(truth_plan()));
   }
 
   void find_reference(bool soft) {
     if (!soft) return;
-    std::vector<std::string> names;
-    for (const TunableObject& object : objects_) names.push_back(object.own.object);
     const EvaluationCache cache(options_.cache, scene_);
-    result_.truth = measure_truth({.as_read = scene_,
-                                   .objects = objects_,
-                                   .names = std::move(names),
-                                   .split = split_,
-                                   .floor_N = result_.floor_N,
-                                   .dt_s = result_.dt_s},
-                                  motion_, cache, step_);
+    result_.truth = measure_truth(truth_plan(), motion_, cache, step_);
+  }
+
+  [[nodiscard]] TruthPlan truth_plan() const {
+    TruthPlan plan{.as_read = scene_,
+                   .objects = objects_,
+                   .names = {},
+                   .floor_N = result_.floor_N,
+                   .dt_s = result_.dt_s};
+    for (const TunableObject& object : objects_) plan.names.push_back(object.own.object);
+    return plan;
   }
 
   // Plays every pass of the variants. Each pass has the reverse order of the one before, so that a machine
@@ -328,7 +329,6 @@ class ModelsRun {
   std::vector<TunableObject> objects_;
   Motion motion_;
   std::vector<GivenObject> given_;
-  int split_ = kTruthSplit;
   ModelsInScene result_;
 };
 

@@ -62,7 +62,6 @@ struct ModelsInScene {
   std::vector<TunableObject> tunable{};  // soft objects, to which ModelRow::setting refers
   std::vector<std::string> untouched{};  // objects that the path does not touch
   std::optional<Truth> truth{};          // empty: nothing soft is touched, and the scene as given is exact
-  std::vector<std::string> notes{};
   double floor_N = 0.04, dt_s = 1e-3;
   double stiffness_N_per_m = 0.0;  // of the tool's coupling, as given
 };

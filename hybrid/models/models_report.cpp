@@ -120,7 +120,6 @@ nlohmann::ordered_json models_json(const ModelsInScene& models) {
               {"stiffness_finger", kStiffnessJndFinger}};
   j["reference"] = reference_json(models);
   j["untouched"] = models.untouched;
-  j["notes"] = models.notes;
   j["objects"] = Json::array();
   for (const ObjectModels& object : models.objects) j["objects"].push_back(object_json(models, object));
   return j;

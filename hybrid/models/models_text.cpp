@@ -232,7 +232,6 @@ std::string models_legend(const ModelsInScene& models) {
       100.0 * kStiffnessJndFinger);
   if (!models.untouched.empty())
     text += fmt::format("not touched by the tool, so not varied: {}\n", joined(models.untouched, ""));
-  for (const std::string& note : models.notes) text += "note: " + note + "\n";
   return text;
 }
 

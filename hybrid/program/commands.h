@@ -93,6 +93,7 @@ struct TuneCommand {
   bool apply = false;                 // write the choice into the scene's file
   std::filesystem::path out;          // write the choice into this file in the scene's folder; empty: do not
   std::filesystem::path plot, cache;  // empty: not written
+  ReportRequest report;
   std::string json;
   std::string command_line;  // as it was typed; for the report
 };

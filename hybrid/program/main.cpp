@@ -185,6 +185,7 @@ void add_tune(CLI::App& app, int& status) {
       ->excludes(apply);
   sub->add_option("--cache", c->cache, "folder that keeps finished parts; a repeated command goes on there");
   sub->add_option("--plot", c->plot, "write error over cost of all settings as SVG");
+  hybrid::add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::tune_scene(*c); });
 }

@@ -8,8 +8,10 @@
 #include "hybrid/base/whole_file.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
+#include "hybrid/program/report_page.h"
 #include "hybrid/session/report.h"
 #include "hybrid/tune/edit_scene.h"
+#include "hybrid/tune/tune_page.h"
 #include "hybrid/tune/tune_plot.h"
 #include "hybrid/tune/tune_report.h"
 
@@ -48,6 +50,7 @@ int tune_scene(const TuneCommand& command) {
   refuse_other_folder(command);  // before --out makes a folder
   Outputs outputs;
   outputs.ask_plot(command.plot);
+  ask_report(outputs, command.report);
   outputs.ask_json(command.json);
   outputs.ask("--out", command.out, {".toml"});
   const TuneResult result = tune(scene, {.error_jnd = command.error_jnd,
@@ -56,9 +59,14 @@ int tune_scene(const TuneCommand& command) {
                                          .cache = command.cache,
                                          .progress = progress_on_terminal()});
   end_progress();
-  outputs.write_json(command.json, tune_report_of(command, result));
-  outputs.write("plot", command.plot, [&](const std::filesystem::path& file) {
-    save_tune_plot(file, result, scene.title.empty() ? command.scene.stem().string() : scene.title);
+  const nlohmann::ordered_json report = tune_report_of(command, result);
+  const std::string title = scene.title.empty() ? command.scene.stem().string() : scene.title;
+  outputs.write_json(command.json, report);
+  outputs.write("plot", command.plot,
+                [&](const std::filesystem::path& file) { save_text(file, tune_svg(result, title)); });
+  outputs.attempt([&] {
+    if (!command.report.folder.empty())
+      write_report(outputs, command.report, tune_page(result, title + ": its settings"), report);
   });
   outputs.write("scene", command.apply ? command.scene : command.out, [&](const std::filesystem::path& file) {
     save_text(file, edited_scene(text, command.scene, result.objects, result.settings[result.chosen].setting,

@@ -41,13 +41,6 @@ std::size_t until_still(double dt_s) {
   return static_cast<std::size_t>(std::lround(kUntilStill_s / dt_s));
 }
 
-bool touches_soft(const World& world, const TickResult& felt) {
-  for (std::size_t o = 0; o < world.soft.size(); ++o) {
-    if ((felt.contacts >> std::min(world.rigid.size() + o, kLastContactBit) & 1U) != 0) return true;
-  }
-  return false;
-}
-
 // Ticks to play slowly.
 std::vector<bool> slow_ticks(const ForceCourse& course, const std::vector<std::size_t>& still, double dt_s) {
   const auto before = static_cast<std::size_t>(std::lround(kBefore_s / dt_s));
@@ -170,7 +163,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
   none.not_measured = "nothing soft was touched";
   if (contact == 0) return none;
   const ScopedFlushToZero flushed;
-  if (options.async_relaxation) start_async_relaxation(state, options.arrival);
+  if (options.async_relaxation) start_async_relaxation(state, Arrival::counted);
   std::vector<bool> wide(state.soft.size(), false);
   const std::vector<std::size_t> still = ticks_still(course, options.dt_s);
   const std::vector<bool> slow = slow_ticks(course, still, options.dt_s);
@@ -179,9 +172,8 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
   Errors errors;
   RestWatch rest(world, options);
   std::size_t seen = 0;
-  bool touching = false;  // options.own_contact: the slow run touches something soft
   glm::dvec3 from = state.device_m;
-  for (std::size_t t = 0; t < course.size() && (seen < contact || touching); ++t) {
+  for (std::size_t t = 0; t < course.size() && seen < contact; ++t) {
     if (device::stop_signal() != 0) {
       none.not_measured = "stopped by a signal";
       return none;
@@ -193,7 +185,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
     const CourseTick& tick = course[t];
     if (still[t] == 0) rest.see(false, {});
     const int factor = still[t] > 0 && options.slower_still > 0 ? options.slower_still : options.slower;
-    const int parts = (slow[t] || touching) && !rest.at_rest() ? factor : 1;
+    const int parts = slow[t] && !rest.at_rest() ? factor : 1;
     TickResult felt;
     for (int n = 1; n <= parts; ++n) {
       const device::DeviceState at{
@@ -205,9 +197,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
     from = tick.device_m;
     const glm::dvec3 reference = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
     rest.see(still[t] > 0, reference);
-    const bool soft = touches_soft(world, felt);
-    touching = options.own_contact && soft && still[t] <= until_still(options.dt_s);
-    if (options.felt) options.felt(t, reference, soft);
+    if (options.felt) options.felt(t, reference);
     if (!tick.soft || seen++ % stride != 0) continue;
     errors.add(glm::distance(tick.force_N, reference), jnd_of(tick.force_N, reference, options.floor_N),
                static_cast<double>(t) * options.dt_s, static_cast<double>(still[t]) * options.dt_s);

@@ -36,6 +36,7 @@ struct CourseTick {
   glm::dvec3 device_m{0.0};
   glm::dvec3 force_N{0.0};  // of the coupling between device and proxy
   bool soft = false;        // something soft is in contact
+  bool at_rest = true;      // of a reference: false between the poses at which it came to rest
 };
 using ForceCourse = std::vector<CourseTick>;
 
@@ -62,7 +63,6 @@ struct SlowRunOptions {
   double floor_N = 0.04;  // lower bound of the JND (N)
   int most = 0;           // greatest number of compared ticks, evenly spread; set it to at least 1
   bool async_relaxation = false;
-  Arrival arrival = Arrival::counted;                // of the results of asynchronous relaxation
   std::function<void(const std::string&)> progress;  // may be empty
   int slower = kSlower;                              // slow-down factor; at least 1
   int slower_still = 0;                              // the same while the device is still; 0: `slower`
@@ -72,13 +72,9 @@ struct SlowRunOptions {
   // (JND) within kRestTicks. From there on it is played as fast as the session. 0: it never counts as at
   // rest.
   double at_rest_jnd = 0.0;
-  // The run is slow wherever it touches something soft itself, too, and goes on until it does no more. Where
-  // tissue of the course lags behind a tool that retreats, the course loses contact earlier.
-  bool own_contact = false;
-  // Called for each tick that is played, compared or not, with its number, the slow run's force (N), and
-  // whether it touches something soft. The run ends with the last tick in which something soft is in contact.
-  // May be empty.
-  std::function<void(std::size_t, const glm::dvec3&, bool)> felt{};
+  // Called for each tick that is played, compared or not, with its number and the slow run's force (N). The
+  // run ends with the last tick in which something soft is in contact. May be empty.
+  std::function<void(std::size_t, const glm::dvec3&)> felt{};
 };
 
 // The options of a reference.

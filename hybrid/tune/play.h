@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Plays a scene with one setting along a motion, at normal speed (forces, times of ticks, size) or slowly
-// (forces for the truth).
+// Plays a scene with one setting along a motion, at normal speed (forces, times of ticks, size) or from pose
+// to pose, with tissue at rest in each (forces for the truth).
 #pragma once
 
 #include <cstdint>
@@ -34,14 +34,34 @@ struct Played {
 Played play_setting(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
                     const Progress& progress);
 
-// Plays the same session `slower` times slower wherever one of the objects is felt (compare_with_slow_run()),
-// and at normal speed elsewhere.
-ForceCourse play_slowly(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
-                        int slower, const Progress& progress);
+// The ticks in which a motion is stopped. All have an entry for each tick.
+struct Poses {
+  std::vector<bool> held;
+  std::vector<bool> near;   // near a contact
+  std::vector<bool> stops;  // the first tick of a stop, after which all stay at rest
+};
+// Poses of a motion that a session felt as `course`: of the ticks near a contact in which something moves at
+// most `most`, evenly spread, and the stops there. `bodies_move`: rigid bodies move even if the device does
+// not, so that there are no stops.
+Poses poses_along(const ForceCourse& course, double dt_s, bool bodies_move, int most);
+// Every `n`-th of them, and all stops.
+Poses every_nth(const Poses& poses, std::size_t n);
 
-// The same motion, 1.5 times faster and moved by `offset_m`. It serves to confirm the choice, because no
-// setting was chosen on it.
-Motion other_motion(const Motion& motion, double rate_hz, const glm::dvec3& offset_m);
-inline constexpr double kOtherSpeed = 1.5;  // factor on the speed of the motion
+// Forces of tissue at rest.
+struct RestCourse {
+  // at_rest is false in ticks with contact or near one that are not held: there tissue lags behind the tool.
+  ForceCourse course;
+  // The same after half of the time that each pose was held.
+  ForceCourse halfway;
+  Poses poses;
+};
+
+// Plays a motion and stops it in each pose, until tissue is at rest; bodies do not move meanwhile. Where one
+// of the objects is felt, the device moves `slower` times slower between them.
+RestCourse play_to_rest(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
+                        const Poses& poses, int slower, const Progress& progress);
+
+// The same motion, `speed` times faster and moved by `offset_m`.
+Motion other_motion(const Motion& motion, double rate_hz, double speed, const glm::dvec3& offset_m);
 
 }  // namespace hybrid

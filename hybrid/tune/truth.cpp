@@ -12,35 +12,47 @@
 namespace hybrid {
 namespace {
 
-// Orders of the errors. Spacing: the edge of a contact is known to one spacing, and so is, if the shapes
-// differ, a surface. Both errors are of first order, for either energy.
-constexpr double kSpacingOrder = 1.0;
-// Slowness: between 5, 10 and 20 times slower the forces differ by 0.69 and 0.45 JND (p99, moving) and by
-// 0.55 and 0.34 (still) in the starter scene of `compose`, which is order 0.6 and 0.7; 0.49 and 0.24, 0.32
-// and 0.10 in ball-and-block, order 1 and more. The least one gives the largest error.
-constexpr double kRestOrder = 0.6;
-constexpr double kCoarser = 2.0;          // ratio of spacings where the voxels are not divided
-constexpr double kMostTruthVoxels = 4e6;  // voxels are not divided if there would be more
-constexpr double kSlowPlays = 0.4;        // assumed share of a path in contact, for the weight of a slow run
-// Exponent of 1/scale; less than 3, because mainly the voxels near the contact cost time.
-constexpr double kWeightPower = 1.5;
+// Orders of the errors. Spacing: the edge of a contact is known to one spacing, an error of first order for
+// either energy. Rest: the least order at which the force was seen to approach rest with the time of a hold.
+constexpr double kSpacingOrder = 1.0, kRestOrder = 0.6;
+// Poses of the truth in which the device moves, so that their p99 is not a single one of them.
+constexpr int kPoses = 128, kQuickPoses = 64;
+// Of these, every so many are also taken on other voxels.
+constexpr int kPosesApart = 6;
+// Factors by which the device is slower between the poses. Where it stays in a pose longer than it moves, its
+// speed matters little, so that the large lattices of other voxels move faster.
+constexpr int kSlowerBetween = 10, kSlowerApart = 2;
+constexpr double kMostVoxels = 4e6;   // voxels are not divided if there would be more
+constexpr double kPoseWeight = 0.25;  // cost of a pose, if that of a session at the same spacing is 1
+constexpr double kSlowPlays = 0.4;    // assumed share of a path in contact
+// Exponents of 1/scale. Of a session less than 3, because mainly the voxels near the contact cost time.
+constexpr double kWeightPower = 1.5, kPosePower = 3.0;
 
-nlohmann::json course_json(const ForceCourse& course) {
+nlohmann::json course_json(const RestCourse& played) {
   nlohmann::json j = nlohmann::json::array();
-  for (const CourseTick& t : course) {
-    j.push_back({t.device_m.x, t.device_m.y, t.device_m.z, t.force_N.x, t.force_N.y, t.force_N.z,
-                 t.soft ? 1.0 : 0.0});
+  for (std::size_t t = 0; t < played.course.size(); ++t) {
+    const CourseTick& c = played.course[t];
+    const glm::dvec3& half_N = played.halfway[t].force_N;
+    j.push_back({c.device_m.x, c.device_m.y, c.device_m.z, c.force_N.x, c.force_N.y, c.force_N.z,
+                 c.soft ? 1.0 : 0.0, c.at_rest ? 1.0 : 0.0, half_N.x, half_N.y, half_N.z,
+                 played.poses.held[t] ? 1.0 : 0.0, played.poses.near[t] ? 1.0 : 0.0,
+                 played.poses.stops[t] ? 1.0 : 0.0});
   }
   return j;
 }
 
-ForceCourse course_from(const nlohmann::json& j) {
-  ForceCourse course;
+RestCourse course_from(const nlohmann::json& j) {
+  RestCourse played;
   for (const auto& row : j) {
-    const auto t = row.get<std::array<double, 7>>();
-    course.push_back({{t[0], t[1], t[2]}, {t[3], t[4], t[5]}, t[6] != 0.0});
+    const auto t = row.get<std::array<double, 14>>();
+    played.course.push_back({{t[0], t[1], t[2]}, {t[3], t[4], t[5]}, t[6] != 0.0, t[7] != 0.0});
+    played.halfway.push_back(played.course.back());
+    played.halfway.back().force_N = {t[8], t[9], t[10]};
+    played.poses.held.push_back(t[11] != 0.0);
+    played.poses.near.push_back(t[12] != 0.0);
+    played.poses.stops.push_back(t[13] != 0.0);
   }
-  return course;
+  return played;
 }
 
 FeltError times(FeltError error, double factor) {
@@ -66,15 +78,6 @@ Setting at_scale(const std::vector<TunableObject>& objects, double scale) {
   return setting;
 }
 
-// The spacing of one setting over that of the other: geometric mean over the objects.
-double ratio_of(const std::vector<TunableObject>& objects, const Setting& coarse, const Setting& fine) {
-  double sum = 0.0;
-  for (std::size_t n = 0; n < objects.size(); ++n) {
-    sum += std::log(scale_of(objects[n], coarse.objects[n]) / scale_of(objects[n], fine.objects[n]));
-  }
-  return std::exp(sum / static_cast<double>(objects.size()));
-}
-
 // Do the shapes of the objects depend on the spacing at which their labels are read? The edges of a plain
 // block are whole numbers of voxels at any spacing.
 bool shapes_depend_on_spacing(const Scene& as_read, const std::vector<TunableObject>& objects) {
@@ -96,69 +99,15 @@ double play_weight(double scale) {
   return std::pow(scale, -kWeightPower);
 }
 
-double slow_weight(double scale, int slower) {
-  return play_weight(scale) * (1.0 + kSlowPlays * slower);
-}
-
-double truth_weight(int split) {
-  const double scale = 1.0 / split;
-  // The truth, half as slow, and with other shapes; the undivided voxels.
-  return slow_weight(scale, kTruthSlower) + 2.0 * slow_weight(scale, kTruthSlower / 2) +
-         slow_weight(1.0, kTruthSlower);
-}
-
-int truth_split(const Scene& as_read, const std::vector<TunableObject>& objects,
-                std::vector<std::string>& notes) {
-  const BuiltScene built = build_scene(as_reference(as_read, own_setting(objects)));
-  double voxels = 0.0;
-  for (const auto& object : built.state->soft) voxels += static_cast<double>(object->lattice().voxel_count());
-  if (voxels * std::pow(kTruthSplit, 3) <= kMostTruthVoxels) return kTruthSplit;
-  notes.push_back(fmt::format(
-      "the truth has the scene's own spacing, because voxels half as wide would be more than {:.0f} "
-      "million",
-      1e-6 * kMostTruthVoxels));
-  return 1;
-}
-
-double Truth::error_jnd() const {
-  return std::max(spacing.moving.p99_jnd + rest.moving.p99_jnd, spacing.still.p99_jnd + rest.still.p99_jnd);
-}
-
-ForceCourse slow_course(const TruthPlan& plan, const TruthGrid& grid, const Motion& motion,
-                        const std::string& motion_words, int slower, const EvaluationCache& cache,
-                        const Step& step) {
-  const std::string key = fmt::format("slow {} {} {}\nsplit {}\n{}", slower, motion.ticks, motion_words,
-                                      grid.split, as_toml(grid.setting));
-  ForceCourse course;
-  const double scale = scale_of(plan.objects.front(), grid.setting.objects.front()) / grid.split;
-  const std::string words = fmt::format("the truth at {:.2g} of the own spacing, {} times slower{}", scale,
-                                        slower, motion_words.empty() ? "" : ", " + motion_words);
-  step(words, slow_weight(scale, slower), [&](const Progress& progress) {
-    if (const auto kept = cache.find(key)) {
-      course = course_from(*kept);
-      return;
-    }
-    course = play_slowly(as_reference(plan.as_read, grid.setting, grid.split), plan.names, motion, slower,
-                         progress);
-    cache.keep(key, course_json(course));
-  });
-  return course;
-}
-
 namespace {
 
-using Course = std::function<ForceCourse(const TruthGrid& grid, int slower)>;
-
-SettingError differs(const ForceCourse& other, const Truth& truth, const TruthPlan& plan) {
-  return felt_error(other, truth.course, plan.floor_N, plan.dt_s);
+double rest_weight(double scale, int poses, int slower) {
+  return play_weight(scale) * (1.0 + kSlowPlays * slower) +
+         kPoseWeight * poses * std::pow(scale, -kPosePower);
 }
 
-Truth truth_on(const TruthPlan& plan, const TruthGrid& grid, const Course& course) {
-  Truth truth;
-  truth.grid = grid;
-  truth.course = course(grid, kTruthSlower);
-  truth.rest = richardson(differs(course(grid, kTruthSlower / 2), truth, plan), 2.0, kRestOrder);
-  return truth;
+int poses_of(const TruthPlan& plan) {
+  return plan.quick ? kQuickPoses : kPoses;
 }
 
 std::string words_of(const TruthPlan& plan, const TruthGrid& grid) {
@@ -168,55 +117,100 @@ std::string words_of(const TruthPlan& plan, const TruthGrid& grid) {
     const auto soft = std::ranges::find(exact.soft, object.object, &SoftDescription::name);
     object = {object.object, false, object.spacing, soft->energy};
   }
-  const std::string words = in_words(shown, plan.as_read.unit_m);
-  return grid.split == 1
-             ? words
-             : fmt::format("{}, each voxel divided into {}", words, grid.split * grid.split * grid.split);
+  return in_words(shown, plan.as_read.unit_m);
 }
 
-// The truth on divided voxels, or on the undivided ones.
-Truth with_own_shapes(const TruthPlan& plan, const Course& course) {
-  const TruthGrid undivided{at_scale(plan.objects, 1.0)};
-  Truth truth = truth_on(plan, {undivided.setting, plan.split}, course);
-  const SettingError off = differs(course(undivided, kTruthSlower), truth, plan);
-  const auto ratio = static_cast<double>(plan.split);
-  truth.spacing = richardson(off, ratio, kSpacingOrder);
-  if (truth.rest.worst_jnd() <= kAtRest_jnd) return truth;
-  Truth coarse = truth_on(plan, undivided, course);
-  const double larger = std::pow(ratio, kSpacingOrder);  // its error over that of the divided voxels
-  coarse.spacing = {times(truth.spacing.moving, larger), times(truth.spacing.still, larger)};
-  return coarse.error_jnd() < truth.error_jnd() ? coarse : truth;
+// The poses along a motion, from a session at normal speed.
+Poses find_poses(const TruthPlan& plan, const Motion& motion, const Progress& progress) {
+  const Scene scene = as_reference(plan.as_read, at_scale(plan.objects, 1.0));
+  const bool bodies_move = std::ranges::any_of(scene.rigid, [](const RigidDescription& rigid) {
+    return !std::holds_alternative<std::monostate>(rigid.motion);
+  });
+  return poses_along(play_setting(scene, plan.names, motion, progress).course, plan.dt_s, bodies_move,
+                     poses_of(plan));
 }
 
-// The truth at the scene's own spacing, beside voxels twice as wide, whose shapes differ.
-Truth with_other_shapes(const TruthPlan& plan, const Course& course) {
-  const TruthGrid own{at_scale(plan.objects, 1.0)}, coarse{at_scale(plan.objects, kCoarser)};
-  Truth truth = truth_on(plan, own, course);
-  truth.own_shape = false;
-  truth.spacing = richardson(differs(course(coarse, kTruthSlower), truth, plan),
-                             ratio_of(plan.objects, coarse.setting, own.setting), kSpacingOrder);
-  return truth;
+// The course on this grid, from the cache if it is there. `at`: finds the poses; `count`: about so many.
+RestCourse course_on(const TruthPlan& plan, const TruthGrid& grid, const Motion& motion,
+                     const std::string& motion_words, int count, int slower,
+                     const std::function<Poses(const Progress&)>& at, const EvaluationCache& cache,
+                     const Step& step) {
+  const std::string key = fmt::format("rest {} {} {} {}\nsplit {}\n{}", slower, count, motion.ticks,
+                                      motion_words, grid.split, as_toml(grid.setting));
+  const double scale = scale_of(plan.objects.front(), grid.setting.objects.front()) / grid.split;
+  const std::string words = fmt::format("at rest in some {} poses on {:.2g} of the own spacing{}", count,
+                                        scale, motion_words.empty() ? "" : ", " + motion_words);
+  RestCourse played;
+  step(words, rest_weight(scale, count, slower), [&](const Progress& progress) {
+    if (const auto kept = cache.find(key)) {
+      played = course_from(*kept);
+      return;
+    }
+    const Poses poses = at(progress);
+    played = play_to_rest(as_reference(plan.as_read, grid.setting, grid.split), plan.names, motion, poses,
+                          slower, progress);
+    cache.keep(key, course_json(played));
+  });
+  return played;
+}
+
+// Difference of `course` from `reference` in ticks in which both are at rest.
+SettingError difference(const TruthPlan& plan, const ForceCourse& course, ForceCourse reference) {
+  for (std::size_t t = 0; t < reference.size(); ++t) reference[t].at_rest &= course[t].at_rest;
+  return felt_error(course, reference, plan.floor_N, plan.dt_s);
+}
+
+// May the voxels be divided? If not, the reason.
+std::string too_many_voxels(const TruthPlan& plan) {
+  const BuiltScene built = build_scene(as_reference(plan.as_read, own_setting(plan.objects)));
+  double voxels = 0.0;
+  for (const auto& object : built.state->soft) voxels += static_cast<double>(object->lattice().voxel_count());
+  if (voxels * std::pow(kTruthSplit, 3) <= kMostVoxels) return {};
+  return fmt::format("voxels half as wide would be more than {:.0f} million", 1e-6 * kMostVoxels);
 }
 
 }  // namespace
 
+double truth_course_weight(const TruthPlan& plan) {
+  return 1.0 + rest_weight(1.0, poses_of(plan), kSlowerBetween);
+}
+
+double truth_weight(const TruthPlan& plan) {
+  const double apart = rest_weight(1.0 / kTruthSplit, poses_of(plan) / kPosesApart, kSlowerApart);
+  return truth_course_weight(plan) + (plan.quick ? 1.0 : 2.0) * apart;
+}
+
+RestCourse truth_course(const TruthPlan& plan, const Motion& motion, const std::string& motion_words,
+                        const EvaluationCache& cache, const Step& step) {
+  const auto poses = [&](const Progress& progress) { return find_poses(plan, motion, progress); };
+  return course_on(plan, {at_scale(plan.objects, 1.0)}, motion, motion_words, poses_of(plan), kSlowerBetween,
+                   poses, cache, step);
+}
+
 Truth measure_truth(const TruthPlan& plan, const Motion& motion, const EvaluationCache& cache,
                     const Step& step) {
-  std::map<std::string, ForceCourse> played;
-  const Course course = [&](const TruthGrid& grid, int slower) {
-    ForceCourse& kept = played[fmt::format("{} {}\n{}", slower, grid.split, as_toml(grid.setting))];
-    if (kept.empty()) kept = slow_course(plan, grid, motion, "", slower, cache, step);
-    return kept;
-  };
-  Truth truth = plan.split > 1 ? with_own_shapes(plan, course) : with_other_shapes(plan, course);
-  if (plan.split > 1 && shapes_depend_on_spacing(plan.as_read, plan.objects)) {
-    // Both at half the truth's slowness, where the truth's shapes were played already.
-    truth.shape =
-        felt_error(course({at_scale(plan.objects, 1.0 / plan.split)}, kTruthSlower / 2),
-                   course({truth.grid.setting, plan.split}, kTruthSlower / 2), plan.floor_N, plan.dt_s);
-  }
+  Truth truth;
+  truth.grid = {at_scale(plan.objects, 1.0)};
+  RestCourse own = truth_course(plan, motion, "", cache, step);
+  truth.rest = richardson(felt_error(own.halfway, own.course, plan.floor_N, plan.dt_s), 2.0, kRestOrder);
+  truth.course = std::move(own.course);
   truth.words = words_of(plan, truth.grid);
-  truth.key = fmt::format("split {}\n{}{}", truth.grid.split, as_toml(truth.grid.setting), motion.ticks);
+  truth.key = fmt::format("{}{} {}", as_toml(truth.grid.setting), motion.ticks, poses_of(plan));
+  truth.not_measured = too_many_voxels(plan);
+  if (!truth.not_measured.empty()) return truth;
+  const auto fewer = [&](const Progress&) { return every_nth(own.poses, kPosesApart); };
+  const auto apart = [&](const TruthGrid& grid) {
+    return course_on(plan, grid, motion, "", poses_of(plan) / kPosesApart, kSlowerApart, fewer, cache, step)
+        .course;
+  };
+  const ForceCourse divided = apart({truth.grid.setting, kTruthSplit});
+  // The error of the better of two is their difference if they are of first order, that of the scene's own
+  // voxels twice as much.
+  const SettingError finer = richardson(difference(plan, truth.course, divided), kTruthSplit, kSpacingOrder);
+  const double larger = std::pow(kTruthSplit, kSpacingOrder);
+  truth.spacing = {times(finer.moving, larger), times(finer.still, larger)};
+  if (!plan.quick && shapes_depend_on_spacing(plan.as_read, plan.objects))
+    truth.shape = difference(plan, apart({at_scale(plan.objects, 1.0 / kTruthSplit)}), divided);
   return truth;
 }
 

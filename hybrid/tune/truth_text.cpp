@@ -25,18 +25,14 @@ std::string in_words(const SettingError& error) {
 
 std::string truth_words(const Truth& truth) {
   std::string text = fmt::format(
-      "truth: {}, no thinning, played {} times slower; its own error (p99, extrapolated)\n"
-      "  of its spacing, from voxels twice as wide{}: {}\n"
-      "  of its speed, from twice the speed: {}\n",
-      truth.words, kTruthSlower, truth.own_shape ? " of the same shape" : ", whose shape differs",
-      in_words(truth.spacing), in_words(truth.rest));
-  if (truth.rest.worst_jnd() > 1.0)
-    text += "  the truth does not come to rest within 1 JND: played slower still, its force differs\n";
-  if (truth.shape) {
-    text +=
-        fmt::format("  apart from that: read at half the spacing the objects have other shapes, felt by {}\n",
-                    in_words(*truth.shape));
-  }
+      "truth: {}, no thinning, at rest in poses along the path\n"
+      "  its own error (p99, from holding each pose half as long): {}\n",
+      truth.words, in_words(truth.rest));
+  text += "the scene itself, at any setting (p99)\n  its voxels beside ever finer ones of the same shape";
+  text += truth.spacing ? fmt::format(", extrapolated: {}\n", in_words(*truth.spacing))
+                        : fmt::format(": not measured, {}\n", truth.not_measured);
+  if (truth.shape)
+    text += fmt::format("  its shapes beside those read at half the spacing: {}\n", in_words(*truth.shape));
   return text;
 }
 
@@ -45,13 +41,16 @@ Json to_json(const SettingError& error) {
 }
 
 Json to_json(const Truth& truth) {
+  const auto optional = [](const std::optional<SettingError>& error) {
+    return error ? to_json(*error) : Json(nullptr);
+  };
   return {{"setting", truth.words},
-          {"slower", kTruthSlower},
-          {"spacing_error", to_json(truth.spacing)},
-          {"own_shape", truth.own_shape},
           {"rest_error", to_json(truth.rest)},
           {"error_jnd", truth.error_jnd()},
-          {"shape", truth.shape ? to_json(*truth.shape) : Json(nullptr)}};
+          {"scene",
+           {{"spacing", optional(truth.spacing)},
+            {"shape", optional(truth.shape)},
+            {"not_measured", truth.not_measured}}}};
 }
 
 }  // namespace hybrid

@@ -12,6 +12,7 @@
 #include "hybrid/compare/compare.h"
 #include "hybrid/tune/evaluation.h"
 #include "hybrid/tune/progress.h"
+#include "hybrid/tune/search_motion.h"
 
 namespace hybrid {
 namespace {
@@ -23,8 +24,7 @@ constexpr double kFirstShare = 1.0 / 3.0;  // share of the contact that the firs
 constexpr double kMarginOfPart = 0.3, kMarginOfWhole = 0.1;
 // Timed sessions of each setting; odd, so that a median is one of them.
 constexpr std::size_t kPasses = 5, kQuickPasses = 3;
-constexpr double kOtherWay = 0.5;        // spacings by which the confirming motion is moved sideways
-constexpr double kStaysInContact = 0.5;  // share of the contact that the confirming motion must keep
+constexpr double kOtherSpeed = 1.5;  // of the confirming motion
 
 // A setting under test, with the times of its ticks in each pass.
 struct Trial {
@@ -61,6 +61,7 @@ class Search {
     const std::vector<Setting> settings = common_settings(result_.objects, options_.quick);
     plan(settings);
     find_truth();
+    find_second_motion();
     try_settings(settings);
     match_proxies();
     if (result_.objects.size() > 1) refine();
@@ -85,28 +86,39 @@ class Search {
   }
 
   void plan(const std::vector<Setting>& settings) {
-    split_ = truth_split(as_read_, result_.objects, result_.notes);
-    // Runs for the truth and its error, and for the truth of the confirming motion.
-    progress_.plan(truth_weight(split_) + slow_weight(1.0 / split_, kTruthSlower) / kOtherSpeed);
-    for (const Setting& setting : settings)
-      progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
+    // The truth along the motion, along the second one and along the confirming one.
+    progress_.plan(truth_weight(truth_plan()) + 2.0 * truth_course_weight(truth_plan()));
+    for (const Setting& setting : settings) plan_trial(setting);
+  }
+
+  // Both rounds on both motions, and the timed passes.
+  void plan_trial(const Setting& setting) {
+    progress_.plan(weight(setting) * (2.0 * kFirstShare + 1.0 + static_cast<double>(passes())));
   }
 
   void find_truth() {
-    const TruthPlan plan = truth_plan();
-    result_.truth = measure_truth(plan, motion_, cache_, step_);
-    std::size_t felt = 0;
-    for (const CourseTick& tick : result_.truth.course) felt += tick.soft ? 1 : 0;
-    if (felt == 0) {
+    result_.truth = measure_truth(truth_plan(), motion_, cache_, step_);
+    const ForceCourse& course = result_.truth.course;
+    if (felt_ticks(course) == 0) {
       throw std::runtime_error(fmt::format(
           "{}: its path touches nothing soft; give [path] points within an object (`hybrid check` says where "
           "they lie)",
           as_read_.file.string()));
     }
-    std::size_t seen = 0;
-    for (std::size_t t = 0; t < result_.truth.course.size(); ++t) {
-      seen += result_.truth.course[t].soft ? 1 : 0;
-      if (static_cast<double>(seen) <= kFirstShare * static_cast<double>(felt)) part_ticks_ = t + 1;
+    motions_.push_back({motion_, "", course, part_of(course, kFirstShare)});
+  }
+
+  void find_second_motion() {
+    for (const double side : {1.0, -1.0}) {
+      try {
+        SearchMotion second = moved(side, 1.0);
+        if (!stays_in_contact(second, motions_.front(), 1.0)) continue;
+        second.part_ticks = part_of(second.truth, kFirstShare);
+        result_.second_motion = second.words;
+        motions_.push_back(std::move(second));
+        return;
+      } catch (const SceneError&) {  // the tool begins inside an object there
+      }
     }
   }
 
@@ -114,9 +126,29 @@ class Search {
     return {.as_read = as_read_,
             .objects = result_.objects,
             .names = names_,
-            .split = split_,
+            .quick = options_.quick,
             .floor_N = result_.floor_N,
             .dt_s = dt_s()};
+  }
+
+  // Sessions with a setting on all motions of the search, `part`: of the first round. The errors are the
+  // worst ones, and all else is of the scene's own path.
+  Evaluation evaluate_all(const Setting& setting, bool part) {
+    const auto on = [&](const SearchMotion& m) {
+      return evaluate(setting, {m.motion.path, part ? m.part_ticks : m.motion.ticks}, m.words, m.truth, 0);
+    };
+    Evaluation evaluation = on(motions_.front());
+    for (std::size_t n = 1; n < motions_.size() && evaluation.refused.empty(); ++n) {
+      const Evaluation other = on(motions_[n]);
+      evaluation.error = worse(evaluation.error, other.error);
+      evaluation.at_soft = worse(evaluation.at_soft, other.at_soft);
+      for (const std::string& fault : other.faults) {
+        if (std::ranges::find(evaluation.faults, fault) == evaluation.faults.end())
+          evaluation.faults.push_back(fault);
+      }
+      evaluation.refused = other.refused;
+    }
+    return evaluation;
   }
 
   // One session with a setting: from the cache if it is there, otherwise played.
@@ -155,14 +187,14 @@ class Search {
       for (const Fitted& fitted : matches_) {
         if (setting.coupling_N_per_m == fitted.coupling_N_per_m) trial.tuned.match = fitted.match;
       }
-      take(trial, evaluate(setting, {motion_.path, part_ticks_}, "", result_.truth.course, 0));
+      take(trial, evaluate_all(setting, true));
       trials_.push_back(std::move(trial));
     }
     leave_out(first, kMarginOfPart, fmt::format("after {:.0f} % of the contact", 100.0 * kFirstShare));
     for (std::size_t n = first; n < trials_.size(); ++n) {
       Trial& trial = trials_[n];
       if (!trial.tuned.whole()) continue;
-      Evaluation whole = evaluate(trial.tuned.setting, motion_, "", result_.truth.course, 0);
+      const Evaluation whole = evaluate_all(trial.tuned.setting, false);
       trial.passes = {whole.tick_us};
       trial.tuned.whole_session = whole.refused.empty();
       take(trial, whole);
@@ -222,7 +254,7 @@ class Search {
         if (std::ranges::find(settings, setting) != settings.end()) continue;
         settings.push_back(std::move(setting));
         matches_.push_back({*settings.back().coupling_N_per_m, *match});
-        progress_.plan(weight(settings.back()) * (kFirstShare + static_cast<double>(passes())));
+        plan_trial(settings.back());
       }
     }
     try_settings(settings);
@@ -253,7 +285,7 @@ class Search {
           std::ranges::any_of(trials_, [&](const Trial& trial) { return trial.tuned.setting == setting; });
       if (known) continue;
       settings.push_back(setting);
-      progress_.plan(weight(setting) * (kFirstShare + static_cast<double>(passes())));
+      plan_trial(setting);
     }
     try_settings(settings);
   }
@@ -309,29 +341,19 @@ class Search {
     for (Trial& trial : trials_) result_.settings.push_back(std::move(trial.tuned));
   }
 
-  // Offset along the axis of the scene in which the truth's mean force is least.
-  [[nodiscard]] glm::dvec3 sideways_m() const {
-    glm::dvec3 force(0.0);
-    for (const CourseTick& tick : result_.truth.course) {
-      if (tick.soft) force += tick.force_N;
-    }
-    force = glm::abs(force);
-    glm::dvec3 unit(0.0);
-    unit[force.x <= std::min(force.y, force.z) ? 0 : force.y <= force.z ? 1 : 2] = 1.0;
-    const TunableObject& object = result_.objects.front();
-    const glm::dvec3& spacing = object.own.spacing == glm::dvec3(0.0) ? object.finest : object.own.spacing;
-    return kOtherWay * std::cbrt(spacing.x * spacing.y * spacing.z) * as_read_.unit_m * unit;
+  // The path, moved to this side, so many times faster, with the truth there.
+  [[nodiscard]] SearchMotion moved(double side, double speed) {
+    SearchMotion motion = moved_motion(motions_.front(), as_read_, side, speed);
+    motion.truth = truth_course(truth_plan(), motion.motion, motion.words, cache_, step_).course;
+    return motion;
   }
 
   void confirm() {
-    for (const double side : {1.0, -1.0}) {
+    // First to the side on which the search did not look.
+    for (const double side : {-1.0, 1.0}) {
       try {
-        const glm::dvec3 offset_m = side * sideways_m();
-        const std::string words =
-            fmt::format("the path {} times faster, moved by ({:.3g}, {:.3g}, {:.3g}) mm", kOtherSpeed,
-                        1e3 * offset_m.x, 1e3 * offset_m.y, 1e3 * offset_m.z);
-        confirm_on(other_motion(motion_, as_read_.rate_hz, offset_m), words);
-        return;
+        confirm_on(moved(side, kOtherSpeed));
+        if (result_.confirmation.not_done.empty()) return;
       } catch (const SceneError& error) {  // the tool begins inside an object there
         result_.confirmation = {};
         result_.confirmation.not_done = error.what();
@@ -339,22 +361,18 @@ class Search {
     }
   }
 
-  void confirm_on(const Motion& motion, const std::string& words) {
+  void confirm_on(const SearchMotion& other) {
     Confirmation& confirmation = result_.confirmation;
-    confirmation.motion = words;
-    const ForceCourse truth =
-        slow_course(truth_plan(), result_.truth.grid, motion, words, kTruthSlower, cache_, step_);
-    const auto felt = [](const ForceCourse& course) {
-      return static_cast<double>(std::ranges::count_if(course, &CourseTick::soft));
-    };
-    if (felt(truth) * kOtherSpeed < kStaysInContact * felt(result_.truth.course)) {
+    confirmation = {};
+    confirmation.motion = other.words;
+    if (!stays_in_contact(other, motions_.front(), kOtherSpeed)) {
       confirmation.not_done = "moved sideways the path loses its contact";
       return;
     }
     std::vector<std::vector<double>> passes;
     for (std::size_t pass = 0; pass < kQuickPasses; ++pass) {
       const Evaluation played =
-          evaluate(result_.settings[result_.chosen].setting, motion, words, truth, pass);
+          evaluate(result_.settings[result_.chosen].setting, other.motion, other.words, other.truth, pass);
       if (!played.refused.empty()) throw SceneError(as_read_.file, {}, played.refused);
       confirmation.error = played.error;
       passes.push_back(played.tick_us);
@@ -371,8 +389,7 @@ class Search {
   Scene own_;
   Motion motion_;
   std::vector<std::string> names_;
-  int split_ = kTruthSplit;
-  std::uint64_t part_ticks_ = 1;
+  std::vector<SearchMotion> motions_;  // the scene's own first
   std::vector<Trial> trials_;
   struct Fitted {
     double coupling_N_per_m;

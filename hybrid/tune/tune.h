@@ -30,7 +30,8 @@ struct TunedSetting {
   std::optional<StiffnessMatch> match{};
   std::string left_out;        // why it was not played to the end; empty if it was
   bool whole_session = false;  // played over the whole motion at least once
-  // Against the truth; if left out, perhaps over only a part of the motion. As in Evaluation.
+  // Against the truth, on the worse of the search's motions; if left out, perhaps over only a part of them.
+  // As in Evaluation.
   SettingError error, at_soft;
   // Percentiles over the ticks. Each tick does the same work in every pass, so its time is the median over
   // the passes.
@@ -59,6 +60,9 @@ struct TuneResult {
   Choice choice;  // its indices refer to `settings`
   Bounds bounds;
   Truth truth;
+  // The search's second motion, in words. A setting whose lattice happens to suit the first one alone is not
+  // accurate. Empty: there is none, as the path cannot be moved.
+  std::string second_motion;
   Confirmation confirmation;
   std::vector<TunableObject> objects;
   std::vector<std::string> notes;

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "hybrid/base/letters.h"
-#include "hybrid/base/whole_file.h"
 #include "hybrid/plot/svg_canvas.h"
 #include "hybrid/plot/svg_figure.h"
 
@@ -189,8 +188,8 @@ class TunePlot {
 
 }  // namespace
 
-void save_tune_plot(const std::filesystem::path& svg, const TuneResult& result, const std::string& title) {
-  save_text(svg, TunePlot(result).page(title));
+std::string tune_svg(const TuneResult& result, const std::string& title) {
+  return TunePlot(result).page(title);
 }
 
 }  // namespace hybrid

@@ -99,6 +99,17 @@ std::string doubt_about_cost(const TuneResult& result) {
   return text;
 }
 
+// A property of the scene that no setting changes, if it can be felt: its voxels are wide for this path.
+std::string about_scene(const TuneResult& result) {
+  const Truth& truth = result.truth;
+  if (!truth.spacing || truth.spacing->worst_jnd() < result.bounds.error_jnd) return {};
+  return fmt::format(
+      " Whatever the setting, the scene's own voxels ({}) differ from ever finer ones by about {:.1f} JND: "
+      "if "
+      "the tissue is known more finely, give the scene a smaller spacing, and tune it again.",
+      truth.words, truth.spacing->worst_jnd());
+}
+
 bool voxels_left(const Setting& setting) {
   return std::ranges::any_of(setting.objects, [](const ObjectSetting& one) { return !one.proxy; });
 }
@@ -106,14 +117,15 @@ bool voxels_left(const Setting& setting) {
 // Is a proxy enough? If not, how far off is the nearest one?
 std::string about_proxies(const TuneResult& result) {
   const TunedSetting& chosen = result.settings[result.chosen];
+  const bool enough = !voxels_left(chosen.setting) && result.choice.rule == ChoiceRule::cheapest_accurate;
+  const std::string said = enough ? " A proxy is enough here: no voxels are needed." : "";
   if (chosen.match) {
     return fmt::format(
         "{} Its coupling is the tool's, so it is felt at every object. It fits depths up to {:.2f} mm, as on "
         "this path.",
-        voxels_left(chosen.setting) ? "" : " A proxy is enough here: no voxels are needed.",
-        1e3 * chosen.match->depth_m);
+        said, 1e3 * chosen.match->depth_m);
   }
-  if (!voxels_left(chosen.setting)) return " A proxy is enough here: no voxels are needed.";
+  if (!voxels_left(chosen.setting)) return said;
   const TunedSetting* nearest = nullptr;
   for (const TunedSetting& s : result.settings) {
     if (s.match && (nearest == nullptr || s.error.worst_jnd() < nearest->error.worst_jnd())) nearest = &s;
@@ -197,9 +209,10 @@ std::string left_out_words(const TuneResult& result) {
 
 std::string truth_in_words(const TuneResult& result) {
   return fmt::format(
-             "errors: p99 of the difference from the truth in each tick in which something soft is felt, on "
-             "an "
-             "ideal device;\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n",
+             "errors: p99 of the difference from the truth in its poses, where something soft is felt, on an "
+             "ideal device\n  {}\n  1 JND = max({:.0f} % of the truth's force, {:.2f} N)\n",
+             result.second_motion.empty() ? "on one motion, as the path moved sideways loses its contact"
+                                          : "the worse of two motions: the path, and " + result.second_motion,
              100.0 * kJndShare, result.floor_N) +
          truth_words(result.truth);
 }
@@ -273,7 +286,7 @@ std::string tune_verdict(const TuneResult& result) {
   }
   if (!result.choice.any_sound) text += " Every setting had a fault.";
   return truth_warning(result) + text + about_proxies(result) + doubt_about_error(result) +
-         doubt_about_cost(result);
+         doubt_about_cost(result) + about_scene(result);
 }
 
 std::string tune_reason(const TuneResult& result) {
@@ -283,19 +296,25 @@ std::string tune_reason(const TuneResult& result) {
                             1e3 * s.match->depth_m, s.match->force_N)
               : "";
   return fmt::format(
-      "{}: {} (p99, the truth uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, {:.0f} us){}.",
-      s.words, in_words(s.error), result.truth.error_jnd(), s.tick_us.p999, rule_name(result.choice.rule),
-      result.bounds.error_jnd, result.bounds.budget_us, fitted);
+      "{}: {} (p99, from {} at rest, itself uncertain by {:.2f}), tick p99.9 {:.0f} us; {} ({:.2g} JND, "
+      "{:.0f} us){}.",
+      s.words, in_words(s.error), result.truth.words, result.truth.error_jnd(), s.tick_us.p999,
+      rule_name(result.choice.rule), result.bounds.error_jnd, result.bounds.budget_us, fitted);
 }
 
 std::string tune_words(const TuneResult& result) {
   std::string text = tune_verdict(result) + "\n\n" + table_of_front(result) + "\n";
-  text += truth_in_words(result) + confirmation_words(result) + left_out_words(result);
+  return text + left_out_words(result) + tune_legend(result) + "*: chosen\n";
+}
+
+std::string tune_legend(const TuneResult& result) {
+  std::string text = truth_in_words(result) + confirmation_words(result);
   for (const std::string& note : result.notes) text += "note: " + note + "\n";
-  return text + fmt::format(
-                    "ticks: each one's median over the passes, whose order alternates; *: chosen. The search "
-                    "took {:.0f} s\n",
-                    result.seconds);
+  return text +
+         fmt::format(
+             "ticks: each one's median over the passes, whose order alternates; the search took {:.0f} "
+             "s\n",
+             result.seconds);
 }
 
 nlohmann::ordered_json tune_json(const TuneResult& result) {
@@ -306,6 +325,7 @@ nlohmann::ordered_json tune_json(const TuneResult& result) {
                  {"period_us", result.period_us}};
   j["jnd"] = {{"share", kJndShare}, {"floor_N", result.floor_N}};
   j["truth"] = to_json(result.truth);
+  j["second_motion"] = result.second_motion;
   j["chosen"] = result.settings[result.chosen].words;
   j["rule"] = rule_name(result.choice.rule);
   j["front"] = nlohmann::ordered_json::array();

@@ -13,7 +13,9 @@ namespace hybrid {
 std::string tune_verdict(const TuneResult& result);
 // The reason as a comment for the scene's file: one sentence without line breaks.
 std::string tune_reason(const TuneResult& result);
-// The truth, the front, the settings that were left out, and the confirmation; several lines.
+// How to read the errors, the truth, the confirmation and the notes; a line each.
+std::string tune_legend(const TuneResult& result);
+// The verdict, the front, the settings that were left out, and the legend; several lines.
 std::string tune_words(const TuneResult& result);
 // Keys of `hybrid tune --json`, to be added to report_head().
 nlohmann::ordered_json tune_json(const TuneResult& result);

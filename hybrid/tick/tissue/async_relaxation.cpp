@@ -26,8 +26,6 @@ constexpr int kMaxWaits = 3;
 constexpr std::uint64_t kRowsRelaxed = 400;
 // Ticks between a result and the next submission, in which the contact sees the full residual.
 constexpr std::uint64_t kTicksBetween = 3;
-// The same with Arrival::at_once. Then each result costs a cycle over the whole object, at any spacing.
-constexpr std::uint64_t kTicksBetweenAtOnce = 50;
 
 bool has_arrived(const AsyncRelaxation& async, const AsyncObject& object, std::size_t o,
                  std::uint64_t tick) noexcept {

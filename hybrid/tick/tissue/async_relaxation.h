@@ -7,6 +7,10 @@
 
 namespace hybrid {
 
+// Ticks between a result and the next submission with Arrival::at_once. Then each result costs a cycle over
+// the whole object, at any spacing.
+inline constexpr std::uint64_t kTicksBetweenAtOnce = 50;
+
 // From now on soft objects are relaxed asynchronously. Objects with plasticity, objects on nested patches and
 // all from the 65th on stay in the tick. Allocates. With Arrival::thread the caller must also run a
 // RelaxationThread.

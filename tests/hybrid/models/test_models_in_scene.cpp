@@ -55,11 +55,12 @@ TEST_F(Models, OfASoftBlock) {
                                  "proxy, matched"));
   EXPECT_THAT(row(block, "six-link").left_out, HasSubstr("has this model already"));
 
-  // The errors of a row are those of its own course against the reference, tick by tick.
+  // The errors of a row are those of its own course against the reference, in each tick with this at rest.
   const ModelRow& given = row(block, "as given");
   double most = 0.0;
   for (std::size_t t = 0; t < given.course.size(); ++t) {
     if (!given.course[t].soft && !block.reference[t].soft) continue;
+    if (!block.reference[t].at_rest) continue;
     most =
         std::max(most, hybrid::jnd_of(given.course[t].force_N, block.reference[t].force_N, models.floor_N));
   }

@@ -133,7 +133,7 @@ TEST_F(ForceErrorOfRun, DoesNotRestTooEarly) {
     slow.most = 1;
     slow.async_relaxation = true;
     std::vector<glm::dvec3> felt(course.size(), glm::dvec3(0.0));
-    slow.felt = [&felt](std::size_t tick, const glm::dvec3& force_N, bool) { felt[tick] = force_N; };
+    slow.felt = [&felt](std::size_t tick, const glm::dvec3& force_N) { felt[tick] = force_N; };
     hybrid::begin_session(scene, *again.world, *again.state, session.start_m);
     (void)hybrid::compare_with_slow_run(*again.world, *again.state, course, slow);
     return felt;

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The motions on which settings are compared: the scene's path, and the same path moved sideways. A coarse
+// lattice may suit one path by luck. Half a tool aside it meets other voxels, and a hand would call it the
+// same touch.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "hybrid/scene/scene.h"
+#include "hybrid/tune/play.h"
+
+namespace hybrid {
+
+struct SearchMotion {
+  Motion motion;
+  std::string words;  // empty: the scene's own path
+  ForceCourse truth;
+  std::uint64_t part_ticks = 1;  // length of the part that the first round plays
+};
+
+// Number of ticks in which something soft is felt.
+std::size_t felt_ticks(const ForceCourse& course);
+// The ticks up to this share of the contact.
+std::uint64_t part_of(const ForceCourse& course, double share);
+
+// The path of `own`, moved by half of the tool's radius along the axis of the scene in which the truth's mean
+// force is least, and so many times faster. `side`: 1 or -1. Its truth is left empty.
+SearchMotion moved_motion(const SearchMotion& own, const Scene& scene, double side, double speed);
+// Does the moved motion keep at least half of the contact?
+bool stays_in_contact(const SearchMotion& moved, const SearchMotion& own, double speed);
+
+}  // namespace hybrid
