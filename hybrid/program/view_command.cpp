@@ -45,12 +45,30 @@ PlayRequest request_of(const WindowInput& input) {
           .goal_m = input.dragged_goal_m.value_or(glm::dvec3(0.0))};
 }
 
-SessionNotes notes_of(const Player& player, double t_s, const std::string& message) {
+SessionNotes notes_of(const Player& player, double t_s, const std::string& message,
+                      const std::optional<ChangeEffect>& effect) {
   return {.real_device = player.is_real(),
           .recorded_s = t_s,
           .refused_edits = player.refused_edits(),
           .unseen_ticks = player.unseen_ticks(),
-          .message = message};
+          .message = message,
+          .effect = effect};
+}
+
+// The changes that the second scene has and the first one lacks.
+std::string changes_between(const ViewedScene& before, const ViewedScene& after) {
+  const auto since = static_cast<std::ptrdiff_t>(before.changes.size());
+  return fmt::format("{}", fmt::join(after.changes.begin() + since, after.changes.end(), ", "));
+}
+
+// Shows the scene in which the session goes on, and drops the one before.
+void show_changed(Window& window, std::unique_ptr<ViewedScene>& viewed, std::unique_ptr<ViewedScene> next,
+                  ChangeEffect& effect) {
+  effect.words = changes_between(*viewed, *next);
+  window.add_ticks(viewed->player->samples());
+  window.show_scene(next->drawn, effect.t_s);
+  next->player = std::move(viewed->player);
+  viewed = std::move(next);
 }
 
 ViewScript read_script(const std::filesystem::path& file, const DrawnScene& drawn) {
@@ -82,12 +100,15 @@ void ask_video(const ViewCommand& command) {
 
 // Plays frames that each cover a fixed time, so that the pictures are the same on any machine. Returns the
 // exit status.
-int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window, ViewScript& script) {
+int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
+                ViewScript& script) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
-  Player& player = *viewed.player;
+  Player& player = *viewed->player;
   Snapshot snapshot;
   ViewFiles files(command);
+  SceneChanger changer(command);
+  std::optional<ChangeEffect> effect;
   FrameMeter meter;
   std::optional<VideoFile> video;
   double ahead_s = 0.0;  // simulated time that the frames are ahead of the ticks
@@ -97,6 +118,16 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
     const WindowInput input = window.take_input();
     PlayRequest request = request_of(input);
     for (const Edit& edit : input.edits) player.edit(edit);
+    for (const SceneChange& change : input.changes) changer.ask(change);
+    try {
+      if (auto next = changer.wait(*viewed)) {
+        effect = player.change_scene(next->scene, next->built, next->drawn, next->text);
+        request.asked = nullptr;  // the points belong to the scene before
+        show_changed(window, viewed, std::move(next), *effect);
+      }
+    } catch (const std::exception& e) {
+      files.say(std::string("The scene is as it was: ") + e.what());
+    }
     for (ahead_s += kScriptFrame_s; ahead_s > 0.5 / player.rate_hz(); ahead_s -= 1.0 / player.rate_hz()) {
       if (drag) {
         request.dragging = true;
@@ -104,15 +135,15 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
       }
       player.step(request);
     }
-    player.snapshot(snapshot, input.asked.get());
+    player.snapshot(snapshot, request.asked.get());
     snapshot.presses = input.wants_presses ? player.presses() : std::vector<PairPress>();
     meter.end_session();
     window.add_ticks(player.samples());
-    if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message()))) break;
+    if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message(), effect))) break;
     meter.end();
     if (!command.out.empty()) save_frame(window, frame_file(command.out, n));
     add_to_video(command, window, video);
-    files.save_what_was_asked(window, input, viewed, snapshot, [] { return true; });
+    files.save_what_was_asked(window, input, *viewed, snapshot, [] { return true; });
     if (const int signal = device::stop_signal(); signal != 0) {
       keep_video(command, video);
       fmt::print(stderr, "stopped by {} after {} of {} frames{}{}\n", signal_in_words(signal), n + 1,
@@ -123,7 +154,7 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
   keep_video(command, video);
   fmt::print("{}\n", meter.in_words());
-  return files.save_at_end(viewed) ? 0 : 1;
+  return files.save_at_end(*viewed) ? 0 : 1;
 }
 
 // The session on its own thread, while a window shows it.
@@ -159,6 +190,27 @@ class LiveSession {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return ended_;
+  }
+  // The session goes on in another scene. It stands still meanwhile. Throws std::exception if that is not
+  // possible.
+  ChangeEffect change_scene(PlayRequest request, ViewedScene& next) {
+    if (!hold(request)) throw std::runtime_error("the session does not answer; try again");
+    relaxation_.reset();
+    request.asked = nullptr;  // the points belong to the scene before
+    const auto go_on = [&] {
+      relaxation_ = player_.relaxation_thread(1.0 / kSnapshotEvery_s);
+      ask(request);
+    };
+    try {
+      const ChangeEffect effect = player_.change_scene(next.scene, next.built, next.drawn, next.text);
+      go_on();
+      for (int n = 0; n < kMostWaits && !ended_ && snapshots_.take().scene != player_.scene_number(); ++n)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      return effect;
+    } catch (...) {
+      go_on();
+      throw;
+    }
   }
   [[nodiscard]] bool ended() const { return ended_; }
   device::ServoReport stop() {
@@ -251,23 +303,42 @@ struct LiveWindow {
   ViewFiles files;
   ViewScript script;
   SceneReload reload;
+  SceneChanger changer;
+  std::optional<ChangeEffect> effect{};
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 };
 
 SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
-  SessionNotes notes = notes_of(player, t_s, live.files.message());
+  SessionNotes notes = notes_of(player, t_s, live.files.message(), live.effect);
+  notes.building = live.changer.building();
+  if (!notes.building.empty()) notes.message = notes.building + "; the session goes on meanwhile";
   if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
   if (!live.reload.error().empty())
     notes.error = live.reload.error() + "\nThe session goes on with the scene as it was.";
   return notes;
 }
 
+// Goes on in a changed scene when it is built. Returns whether it did.
+bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, LiveSession& session,
+                        const PlayRequest& request) {
+  try {
+    auto next = live.changer.poll(*viewed);
+    if (next == nullptr) return false;
+    live.effect = session.change_scene(request, *next);
+    show_changed(live.window, viewed, std::move(next), *live.effect);
+    return true;
+  } catch (const std::exception& e) {
+    live.files.say(std::string("The scene is as it was: ") + e.what());
+    return false;
+  }
+}
+
 // Runs the window on this thread and the session on another. Ends when the window closes, or when a changed
 // scene is ready in `next`. Returns the device's events.
-device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& box,
+device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, BlackBox& box,
                               std::unique_ptr<ViewedScene>& next) {
-  LiveSession session(viewed, box);
-  Player& player = *viewed.player;
+  LiveSession session(*viewed, box);
+  Player& player = *viewed->player;
   Snapshot shown;
   PressWatch watch;
   bool open = true;
@@ -275,14 +346,19 @@ device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& b
     live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
                      live.window);
     const WindowInput input = live.window.take_input();
-    const PlayRequest request = request_of(input);
+    PlayRequest request = request_of(input);
     for (const Edit& edit : input.edits) player.edit(edit);
+    for (const SceneChange& change : input.changes) live.changer.ask(change);
+    if (take_changed_scene(live, viewed, session, request)) {
+      request.asked = nullptr;
+      watch = {};
+    }
     session.ask(request);
-    session.shown(viewed.drawn, shown);
+    session.shown(viewed->drawn, shown);
     shown.presses = watch.presses(input, request, player, session, shown.tick);
     live.window.add_ticks(player.samples());
     open = live.window.frame(shown, notes_of(live, player, shown.t_s));
-    live.files.save_what_was_asked(live.window, input, viewed, shown, [&] { return session.hold(request); });
+    live.files.save_what_was_asked(live.window, input, *viewed, shown, [&] { return session.hold(request); });
     if (input.reload) live.reload.ask();
     if (!player.is_real()) next = live.reload.poll();
   }
@@ -293,11 +369,13 @@ device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& b
 device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> viewed, BlackBox& box) {
   for (;;) {
     std::unique_ptr<ViewedScene> next;
-    device::ServoReport report = play_live(live, *viewed, box, next);
+    device::ServoReport report = play_live(live, viewed, box, next);
     if (next == nullptr) {
       if (!live.files.save_at_end(*viewed)) report.messages.emplace_back("the session was not recorded");
       return report;
     }
+    live.changer.cancel();
+    live.effect.reset();
     live.window.show_scene(next->drawn);
     viewed = std::move(next);
     print_notes(viewed->built);
@@ -335,10 +413,15 @@ int view(const ViewCommand& command) {
   viewed->player = std::make_unique<Player>(scene, viewed->built, viewed->drawn, real.get());
   if (command.frames) {
     viewed->player->relax_at_once();
-    return play_frames(command, *viewed, window, script);
+    return play_frames(command, std::move(viewed), window, script);
   }
   const auto kept = open_black_box_file({}, command.scene, true, scene.rate_hz);
-  LiveWindow live{command, window, ViewFiles(command), std::move(script), SceneReload(command, viewed->text)};
+  LiveWindow live{command,
+                  window,
+                  ViewFiles(command),
+                  std::move(script),
+                  SceneReload(command, viewed->text),
+                  SceneChanger(command)};
   const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());

@@ -9,8 +9,11 @@
 #include <stdexcept>
 
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/feel/just_noticeable.h"
+#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/pair_presses.h"
 #include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/tick/take_over.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
 namespace hybrid {
@@ -32,6 +35,18 @@ TickSample sample_of(const TickResult& felt, double t_s, double late_s, double d
           .late = late_s >= dt_s};
 }
 
+// The force on the hand at the present place with all tissue at rest (N), and the voxels of all soft objects.
+struct ForcesHere {
+  std::optional<glm::dvec3> force_N;
+  std::size_t voxels = 0;
+};
+ForcesHere forces_here(const World& world, const WorldState& state) {
+  constexpr double tolerance_N = 1e-3;  // far below the least force that a hand tells
+  ForcesHere here{.force_N = equilibrium_force(world, state, tolerance_N)};
+  for (const auto& object : state.soft) here.voxels += object->lattice().voxel_count();
+  return here;
+}
+
 }  // namespace
 
 glm::dvec3 SteeredPath::position(double t_s) const noexcept {
@@ -50,9 +65,9 @@ void SteeredPath::restart(double now_s) noexcept {
 
 Player::Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
                device::HapticDevice* real_device)
-    : scene_(scene),
-      built_(built),
-      drawn_(drawn),
+    : scene_(&scene),
+      built_(&built),
+      drawn_(&drawn),
       path_(std::make_shared<SteeredPath>(scene_path(scene))),
       simulated_(real_device == nullptr ? scene_device(scene, path_) : nullptr),
       device_(real_device == nullptr ? *simulated_ : *real_device),
@@ -68,20 +83,50 @@ Player::Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
 
 std::unique_ptr<RelaxationThread> Player::go_live(double surfaces_hz) {
   live_ = async_ = true;
-  start_async_relaxation(*built_.state, Arrival::thread);
-  return std::make_unique<RelaxationThread>(*built_.world, built_.state->async, surfaces_hz);
+  arrival_ = Arrival::thread;
+  start_async_relaxation(*built_->state, arrival_);
+  return relaxation_thread(surfaces_hz);
+}
+
+std::unique_ptr<RelaxationThread> Player::relaxation_thread(double surfaces_hz) {
+  return std::make_unique<RelaxationThread>(*built_->world, built_->state->async, surfaces_hz);
 }
 
 void Player::relax_at_once() {
   async_ = true;
-  start_async_relaxation(*built_.state, Arrival::counted);
+  start_async_relaxation(*built_->state, arrival_);
+}
+
+ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
+                                  const std::string& text) {
+  const std::string why_not = why_no_take_over(*built_->world, *built.world);
+  if (!why_not.empty())
+    throw std::runtime_error(why_not + ", so the scene cannot change while it is felt; change its file");
+  if (changes_.size() == kMostChanges) throw std::runtime_error("the session has changed too often");
+  take_edits();  // those that wait belong to the old scene
+  const ForcesHere before = forces_here(*built_->world, *built_->state);
+  if (!take_over(*built_->world, *built_->state, *built.world, *built.state))
+    throw std::runtime_error("the changed scene leaves the tool no free place; move the tool away first");
+  const ForcesHere after = forces_here(*built.world, *built.state);
+  if (async_) start_async_relaxation(*built.state, arrival_);
+  scene_ = &scene;
+  built_ = &built;
+  drawn_ = &drawn;
+  changes_.push_back({.tick = ticks_, .edits_before = applied_.size(), .text = text});
+  edited_ = true;
+  ChangeEffect effect{.t_s = t_s(), .voxels_before = before.voxels, .voxels_after = after.voxels};
+  if (before.force_N) effect.before_N = glm::length(*before.force_N);
+  if (after.force_N) effect.after_N = glm::length(*after.force_N);
+  if (before.force_N && after.force_N)
+    effect.difference_jnd = jnd_of(*after.force_N, *before.force_N, jnd_floor_N(scene));
+  return effect;
 }
 
 void Player::take_edits() noexcept {
   Edit edit;
   while (applied_.size() < kMostEdits && edits_.pop(edit)) {
     edit.tick = ticks_;
-    if (apply_edit(*built_.world, *built_.state, edit)) applied_.push_back(edit);
+    if (apply_edit(*built_->world, *built_->state, edit)) applied_.push_back(edit);
     edited_ = true;
   }
 }
@@ -119,7 +164,7 @@ void Player::keep(device::DeviceFault fault) noexcept {
     whole_ = false;
     return;
   }
-  recorded_.push_back({felt_.device_m, hash_, fault, built_.state->async.arrived, 0});
+  recorded_.push_back({felt_.device_m, hash_, fault, built_->state->async.arrived, 0});
 }
 
 bool Player::advance(const PlayRequest& request, const device::ServoInput& input) noexcept {
@@ -128,7 +173,7 @@ bool Player::advance(const PlayRequest& request, const device::ServoInput& input
   take_edits();
   if (!tick_is_due(request)) return false;
   steer(request);
-  felt_ = haptic_tick(*built_.world, *built_.state, input.device, dt_s_);
+  felt_ = haptic_tick(*built_->world, *built_->state, input.device, dt_s_);
   if (!request.dragging) goal_m_ = felt_.device_m;
   keep(input.device.fault);
   samples_.push(sample_of(felt_, t_s(), input.late_s, dt_s_));
@@ -141,24 +186,30 @@ void Player::step(const PlayRequest& request) {
 }
 
 void Player::snapshot(Snapshot& out, const AskedPoints* asked) const {
-  out.tick = built_.state->tick;
+  if (out.scene != scene_number()) out = Snapshot();
+  out.scene = scene_number();
+  out.tick = built_->state->tick;
   out.t_s = t_s();
   out.device_m = felt_.device_m;
   out.proxy_m = felt_.proxy_m;
   out.force_N = felt_.force_N;
-  out.feel = built_.state->feel;
+  out.feel = built_->state->feel;
   out.tick_us = felt_.tick_us;
-  fill_values(*built_.world, *built_.state, drawn_, out);
+  fill_values(*built_->world, *built_->state, *drawn_, out);
   if (live_) {
-    fill_moved_near(*built_.world, *built_.state, out);
+    fill_moved_near(*built_->world, *built_->state, out);
   } else {
-    fill_moved(*built_.world, *built_.state, out);
+    fill_moved(*built_->world, *built_->state, out);
   }
-  if (asked != nullptr) fill_asked(*built_.world, *built_.state, *asked, live_, out);
+  if (asked != nullptr) {
+    fill_asked(*built_->world, *built_->state, *asked, live_, out);
+  } else {
+    out.asked.number = 0;
+  }
 }
 
 std::vector<PairPress> Player::presses() const {
-  return pair_presses(*built_.world, *built_.state);
+  return pair_presses(*built_->world, *built_->state);
 }
 
 Recording Player::recording(const std::string& scene_text) const {
@@ -168,15 +219,16 @@ Recording Player::recording(const std::string& scene_text) const {
                     "restart the window and record a shorter one",
                     kMostRecorded_s / 60.0));
   }
-  return {.scene_file = std::filesystem::absolute(scene_.file),
+  return {.scene_file = std::filesystem::absolute(scene_->file),
           .scene_text = scene_text,
           .dt_s = dt_s_,
-          .device = scene_limits(scene_),
+          .device = scene_limits(*scene_),
           .async_relaxation = async_,
-          .state_hash = hash_state(hash_, *built_.state),
+          .state_hash = hash_state(hash_, *built_->state),
           .start_m = start_m_,
           .ticks = recorded_,
-          .edits = applied_};
+          .edits = applied_,
+          .changes = changes_};
 }
 
 }  // namespace hybrid

@@ -110,14 +110,14 @@ PixelRect take_place(float height) {
   return {static_cast<int>(at.x), static_cast<int>(at.y), static_cast<int>(width), static_cast<int>(height)};
 }
 
+}  // namespace
+
 void label_beside(const Pen& pen, const std::string& words) {
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(words.c_str());
   ImGui::SameLine(9.2F * pen.em);
   ImGui::SetNextItemWidth(-0.1F * pen.em);
 }
-
-}  // namespace
 
 void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const {
   const ViewState& state = frame.state;
@@ -271,7 +271,9 @@ void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot
     any = true;
     edited = edited || snapshot.values[n] != value.in_scene;
   }
-  if (!any) ImGui::TextDisabled("Its values are fixed while it is felt.");
+  const bool tissue = selected < scene.objects.size() && scene.objects[selected].choices.tissue;
+  if (tissue) draw_choices(pen, scene, frame, result);
+  if (!any && !tissue) ImGui::TextDisabled("Its values are fixed while it is felt.");
   if (selected < scene.objects.size()) {
     label_beside(pen, "opacity");
     float opacity = 100.0F * frame.state.view.look_of(selected).opacity;
@@ -400,6 +402,8 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     }
     const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
     if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
+    if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
+      draw_effect(pen, frame);
     if (open_section("View")) draw_view(pen, scene, frame, result);
     Pen chart = pen;
     chart.list = ImGui::GetWindowDrawList();

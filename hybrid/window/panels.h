@@ -3,6 +3,7 @@
 // tick times. It draws with Dear ImGui and returns actions. It changes nothing itself.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,12 +19,14 @@ namespace hybrid {
 
 // Data that the session gives its window besides snapshots.
 struct SessionNotes {
-  bool real_device = false;         // slow motion is not possible
-  double recorded_s = 0.0;          // length of the recording so far
-  std::uint64_t refused_edits = 0;  // refused because too many edits waited
-  std::uint64_t unseen_ticks = 0;   // ticks missing in the charts because a frame took too long
-  std::string message{};            // result of the last action; empty: none
-  std::string error{};              // error in the scene's file; empty: none
+  bool real_device = false;              // slow motion is not possible
+  double recorded_s = 0.0;               // length of the recording so far
+  std::uint64_t refused_edits = 0;       // refused because too many edits waited
+  std::uint64_t unseen_ticks = 0;        // ticks missing in the charts because a frame took too long
+  std::string message{};                 // result of the last action; empty: none
+  std::string error{};                   // error in the scene's file; empty: none
+  std::string building{};                // progress of a changed scene that is built; empty: none
+  std::optional<ChangeEffect> effect{};  // of the last change of the scene
 };
 
 // The data that the panel shows in one frame.
@@ -62,6 +65,11 @@ class Panels final : public OverlayPanel {
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
                    PanelResult& result);
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
+  // ---- panel_choices.cpp ----
+  void draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
+  void draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result);
+  void draw_effect(const Pen& pen, const PanelFrame& frame) const;
+  // ----
   void draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const;
 
   const PanelFrame* frame_ = nullptr;
@@ -74,7 +82,17 @@ class Panels final : public OverlayPanel {
   // frame later.
   std::size_t moved_ = static_cast<std::size_t>(-1);
   float moved_to_ = 0.0F;
+  // Young's modulus (kPa) that the user gives to a material, until the changed scene is there.
+  struct AskedYoung {
+    std::string material;
+    float young_kPa = 0.0F;
+    int frames_left = 0;  // for which it is shown although nothing is built
+  };
+  std::optional<AskedYoung> asked_young_;
 };
+
+// Writes a label at the left; the next control comes beside it.
+void label_beside(const Pen& pen, const std::string& words);
 
 // ---- charts (panel_charts.cpp) ----
 // Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in

@@ -19,6 +19,7 @@ enum class ViewVerb : std::uint8_t {
   speed,           // numbers: simulated time over real time
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
+  change,          // change: of the scene, which is built again
   select,          // object
   show,            // object, numbers: 1 visible, 0 hidden
   opacity,         // object, numbers: 0 to 1
@@ -50,6 +51,7 @@ struct ViewAction {
   std::string text{};
   std::uint32_t object = Edit::kTool;
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
+  SceneChange change{};
 };
 
 struct ViewState {
@@ -61,6 +63,7 @@ struct ViewState {
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;
   std::vector<Edit> edits{};
+  std::vector<SceneChange> changes{};
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look
@@ -68,6 +71,9 @@ struct ViewState {
 
 // Least speed, as a share of real time. Speeds up to 1 are allowed.
 inline constexpr double kLeastSpeed = 1e-3;
+
+// Gives looks and selection to the objects of the same name in another scene.
+void go_to_scene(ViewState& state, const DrawnScene& before, const DrawnScene& after);
 
 // Applies an action. Only a window can apply key, click, drag and wheel.
 void act(ViewState& state, const ViewAction& action);

@@ -342,16 +342,23 @@ Window::Window(const DrawnScene& scene, const WindowOptions& options) {
 
 Window::~Window() = default;
 
-void Window::show_scene(const DrawnScene& scene) {
+void Window::show_scene(const DrawnScene& scene, std::optional<double> changed_at_s) {
   State& s = *state_;
   glfwMakeContextCurrent(s.window.get());
   s.painter->release();
+  go_to_scene(s.user, *s.scene, scene);
   s.scene = &scene;
   s.box = soft_box(scene);
   s.painter.emplace(scene, Samples::fast, s.height);
-  s.history.clear();
-  if (s.user.selected != Edit::kTool && s.user.selected >= scene.objects.size())
-    s.user.selected = Edit::kTool;
+  if (changed_at_s) {
+    s.history.mark(*changed_at_s);
+  } else {
+    s.history.clear();
+  }
+}
+
+const DrawnScene& Window::scene() const {
+  return *state_->scene;
 }
 
 bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
@@ -401,6 +408,7 @@ WindowInput Window::take_input() {
           .single_ticks = s.user.single_ticks,
           .asked = s.painter->asked(s.user.view),
           .edits = std::exchange(s.user.edits, {}),
+          .changes = std::exchange(s.user.changes, {}),
           .recording = std::exchange(s.user.recording, {}),
           .save_scene = std::exchange(s.user.save_scene, false),
           .reload = std::exchange(s.user.reload, false)};

@@ -35,6 +35,7 @@ struct WindowInput {
   std::shared_ptr<const AskedPoints> asked;      // points whose displacements the next frame needs, or null
   // ---- since the last call ----
   std::vector<Edit> edits;
+  std::vector<SceneChange> changes;
   std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name
   bool save_scene = false, reload = false;
 };
@@ -56,8 +57,10 @@ class Window {
   Window& operator=(Window&&) = delete;
   ~Window();
 
-  // Shows another scene from now on. View and selection stay. Keeps a reference to the scene.
-  void show_scene(const DrawnScene& scene);
+  // Shows another scene from now on. View, looks and selection stay. Keeps a reference to the scene.
+  // `changed_at_s`: time of the session at which it goes on in this scene; empty: a new session begins.
+  void show_scene(const DrawnScene& scene, std::optional<double> changed_at_s = {});
+  [[nodiscard]] const DrawnScene& scene() const;
 
   // Shows a snapshot and handles the input since the last call. Waits for the display's refresh. Returns
   // false if the user closed the window. Throws std::runtime_error if the driver fails.

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "hybrid/tick/proxy/proxy_step.h"
 #include "polygon/surface/rigid_surface.h"
 
 namespace hybrid {
@@ -55,32 +56,61 @@ bool touches_rigid(const World& world, const WorldState& state, const glm::dvec3
   return false;
 }
 
+bool is_outside(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+  return !touches_tissue(world, state, point) && !touches_rigid(world, state, point);
+}
+
+// The places that a search tries: up to `way_m` away, `step_m` apart.
+struct Search {
+  double step_m = std::numeric_limits<double>::max(), way_m = 0.0;
+};
+
+Search search_of_tissue(const World& world, const WorldState& state) noexcept {
+  Search search;
+  for (const auto& object : state.soft) {
+    const auto& dims = object->lattice().grid().dims;
+    search.step_m = std::min(search.step_m, object->lattice().min_spacing_m());
+    search.way_m += glm::length(object->lattice().spacing_m() * glm::dvec3(dims[0], dims[1], dims[2]));
+  }
+  search.way_m += 2.0 * world.tool.radius_m;
+  return search;
+}
+
 }  // namespace
 
 bool leave_tissue(const World& world, WorldState& state) noexcept {
   const glm::dvec3 from = state.proxy_m;
   if (state.soft.empty() || !touches_tissue(world, state, from)) return true;
-  double step = std::numeric_limits<double>::max(), way = 0.0;
-  for (std::size_t o = 0; o < state.soft.size(); ++o) {
-    const voxel::Lattice& lattice = state.soft[o]->lattice();
-    const auto& dims = lattice.grid().dims;
-    step = std::min(step, lattice.min_spacing_m());
-    way += glm::length(lattice.spacing_m() * glm::dvec3(dims[0], dims[1], dims[2]));
-  }
-  way += 2.0 * world.tool.radius_m;
+  const auto [step, way] = search_of_tissue(world, state);
   for (double far = step; far <= way + step; far += step) {
     for (std::size_t o = 0; o < state.soft.size(); ++o) {
       for (int n = 0; n < 27; ++n) {
         const glm::dvec3 to(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
         if (n == 13) continue;
         const glm::dvec3 point = from + far * (world.soft[o].pose.rotation * glm::normalize(to));
-        if (touches_tissue(world, state, point) || touches_rigid(world, state, point)) continue;
+        if (!is_outside(world, state, point)) continue;
         state.proxy_m = point;
         return true;
       }
     }
   }
   return false;
+}
+
+bool start_outside(const World& world, WorldState& state, const glm::dvec3& device_m, const glm::dvec3& from,
+                   const glm::dvec3& towards) noexcept {
+  const bool outside_rigid = start_proxy(world, state, from);
+  state.device_m = device_m;
+  if (outside_rigid && !touches_tissue(world, state, state.proxy_m)) return true;
+  const double length = glm::length(towards);
+  const double step = 0.5 * world.contact_radius_m(), way = world.extent_m + world.contact_radius_m();
+  for (double far = step; length > 0.0 && far <= way; far += step) {
+    const glm::dvec3 point = from + towards * (far / length);
+    if (!is_outside(world, state, point)) continue;
+    state.proxy_m = point;
+    return true;
+  }
+  return outside_rigid && leave_tissue(world, state);
 }
 
 }  // namespace hybrid

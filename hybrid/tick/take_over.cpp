@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/tick/take_over.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "hybrid/tick/tick.h"
+#include "hybrid/tick/tissue/leave_tissue.h"
+#include "hybrid/world/edits.h"
+
+namespace hybrid {
+namespace {
+
+// The tool is pressed in for kMostTicks at most, and for kSteadyTicks after which the force has changed by
+// less than kSteady_N: a hundredth of what a hand tells.
+constexpr int kMostTicks = 400, kSteadyTicks = 20;
+constexpr double kSteady_N = 5e-4;
+
+template <class Objects>
+std::size_t number_of(const Objects& objects, const std::string& name) {
+  const auto at = std::ranges::find(
+      objects, name, [](const auto& object) -> const auto& { return object.name; });
+  return static_cast<std::size_t>(at - objects.begin());
+}
+
+// Values of objects that are no longer of their kind, soft or rigid, are dropped.
+void take_edited_values(const World& before_world, const WorldState& before, const World& world,
+                        WorldState& state) {
+  state.edited.coupling_N_per_m = before.edited.coupling_N_per_m;
+  state.edited.max_force_N = before.edited.max_force_N;
+  for (std::size_t o = 0; o < world.rigid.size(); ++o) {
+    const std::size_t old = number_of(before_world.rigid, world.rigid[o].name);
+    if (old < before_world.rigid.size()) state.edited.feel[o] = before.edited.feel[old];
+  }
+  for (std::size_t o = 0; o < world.soft.size(); ++o) {
+    const std::size_t old = number_of(before_world.soft, world.soft[o].name);
+    const auto number = static_cast<std::uint32_t>(world.rigid.size() + o);
+    if (old < before_world.soft.size() && edit_range(world, state, number, EditedQuantity::tissue_factor))
+      state.edited.tissue_factor[o] = before.edited.tissue_factor[old];
+  }
+}
+
+void press_in(const World& world, WorldState& state) {
+  const device::DeviceState still{.position_m = state.device_m};
+  glm::dvec3 force(0.0);
+  for (int n = 1; n <= kMostTicks; ++n) {
+    const TickResult felt = haptic_tick(world, state, still, 1e-3);
+    if (n % kSteadyTicks != 0) continue;
+    const glm::dvec3 now = coupling_N_per_m(world, state) * (felt.proxy_m - felt.device_m);
+    if (glm::length(now - force) < kSteady_N) return;
+    force = now;
+  }
+}
+
+}  // namespace
+
+std::string why_no_take_over(const World& before, const World& after) {
+  for (const World* world : {&before, &after}) {
+    for (const RigidObject& object : world->rigid) {
+      if (object.motion.moves()) return "\"" + object.name + "\" moves";
+    }
+  }
+  return {};
+}
+
+bool take_over(const World& before_world, const WorldState& before, const World& world, WorldState& state) {
+  take_edited_values(before_world, before, world, state);
+  if (!start_outside(world, state, before.device_m, before.proxy_m, before.proxy_m - before.device_m))
+    return false;
+  press_in(world, state);
+  state.limit = before.limit;
+  state.passive = before.passive;
+  state.clock = before.clock;
+  state.tick = before.tick;
+  state.nonfinite = before.nonfinite;
+  state.faults |= before.faults;
+  state.truncated_ticks = before.truncated_ticks;
+  return true;
+}
+
+}  // namespace hybrid
