@@ -38,6 +38,7 @@ struct MaterialChoice {
 
 // The changes that one object allows.
 struct ObjectChoices {
+  bool open = false;    // it may be changed while it is felt; false: `note` says why not
   bool tissue = false;  // the scene describes it as [[soft]], even if it is felt as rigid
   bool as_rigid = false, trilinear = false;
   bool other_model = false, other_energy = false;  // can it be changed?

@@ -148,12 +148,20 @@ void move(SceneTextEditor& editor, const Scene& as_read, const SceneChange& chan
 }  // namespace
 
 void add_choices(const Scene& as_read, DrawnScene& drawn) {
+  const auto moves = std::ranges::find_if(as_read.rigid, [](const RigidDescription& rigid) {
+    return !std::holds_alternative<std::monostate>(rigid.motion);
+  });
+  const bool open = moves == as_read.rigid.end();
   for (const TunableObject& changeable : changeable_objects(as_read)) {
     const std::string& name = changeable.own.object;
     const auto soft = std::ranges::find(as_read.soft, name, &SoftDescription::name);
     for (DrawnObject& object : drawn.objects) {
       if (object.name == name) object.choices = choices_of(as_read, changeable, *soft);
     }
+  }
+  for (DrawnObject& object : drawn.objects) {
+    object.choices.open = open;
+    if (!open) object.choices.note = "fixed while it is felt, because \"" + moves->name + "\" moves";
   }
 }
 

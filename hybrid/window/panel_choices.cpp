@@ -1,39 +1,36 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The panel's controls for changes that need a new world: model, energy, spacing, Young's modulus. The effect
 // of the last one.
-#include <imgui.h>
-
-#include <algorithm>
+#include <array>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "hybrid/base/number_text.h"
 #include "hybrid/view/overlay.h"
+#include "hybrid/window/controls.h"
 #include "hybrid/window/panel_words.h"
 #include "hybrid/window/panels.h"
 
 namespace hybrid {
+
+using namespace controls;
+
 namespace {
 
 using Key = SceneChange::Key;
 
+constexpr double kLeastShown_jnd = 0.01;  // smaller differences are those of the equilibrium's tolerance
 constexpr float kUsualFactor = 10.0F;     // a slider goes from a tenth of the modulus to ten times that
-constexpr int kFramesUntilBuilding = 30;  // longest wait for the first news of a scene that is built
 
 // A list of two choices. Returns true if the user took the other one.
-bool two_choices(const Pen& pen, const char* label, bool second, const char* first_words,
-                 const char* second_words, bool enabled) {
-  bool other = false;
+bool took_other(const Pen& pen, const char* label, const char* id, bool second,
+                const std::array<std::string, 2>& words, bool enabled) {
   label_beside(pen, label);
-  ImGui::BeginDisabled(!enabled);
-  ImGui::PushID(label);
-  if (ImGui::BeginCombo("##choice", second ? second_words : first_words)) {
-    if (ImGui::Selectable(first_words, !second)) other = second;
-    if (ImGui::Selectable(second_words, second)) other = !second;
-    ImGui::EndCombo();
-  }
-  ImGui::PopID();
-  ImGui::EndDisabled();
-  return other;
+  begin_fixed(!enabled);
+  const auto taken = choose(id, words[second ? 1 : 0], words);
+  end_fixed();
+  return taken && (*taken == 1) != second;
 }
 
 std::string time_words(double us) {
@@ -41,7 +38,7 @@ std::string time_words(double us) {
 }
 
 std::string force_words(const std::optional<double>& force_N) {
-  return force_N ? force_text(*force_N) : "not at rest";
+  return !force_N ? "not at rest" : *force_N > 0.0 ? force_text(*force_N) : "none";
 }
 
 // "1 234 567"
@@ -51,27 +48,12 @@ std::string grouped(std::size_t number) {
   return words;
 }
 
-void right_aligned(const Pen& pen, const std::string& words) {
-  ImGui::SetCursorPosX(ImGui::GetCursorPosX() +
-                       std::max(0.0F, ImGui::GetContentRegionAvail().x - pen.width(words)));
-  ImGui::TextUnformatted(words.c_str());
-}
-
-void effect_row(const Pen& pen, const char* what, const std::string& before, const std::string& after) {
-  ImGui::TableNextRow();
-  ImGui::TableNextColumn();
-  ImGui::TextUnformatted(what);
-  ImGui::TableNextColumn();
-  right_aligned(pen, before);
-  ImGui::TableNextColumn();
-  right_aligned(pen, after);
-}
-
 // The verdict on the force at the place of the change.
 std::string verdict_on(const ChangeEffect& effect) {
   if (!effect.difference_jnd) return {};
   if (*effect.before_N == 0.0 && *effect.after_N == 0.0)
     return "The tool touched nothing then. Change it in contact to compare forces.";
+  if (*effect.difference_jnd < kLeastShown_jnd) return "The force is the same.";
   const std::string jnd = with_digits(*effect.difference_jnd, 2) + " JND";
   return *effect.difference_jnd < 1.0 ? "The difference is " + jnd + ": no hand tells it."
                                       : "The difference is " + jnd + ": a hand tells it.";
@@ -84,21 +66,15 @@ void Panels::draw_young(const Pen& pen, const MaterialChoice& material, PanelRes
   const bool asked = asked_young_ && asked_young_->material == material.name;
   float shown = asked ? asked_young_->young_kPa : in_scene;
   label_beside(pen, pen.fit("E, " + material.name, 8.6F * pen.em));
-  ImGui::PushID(material.name.c_str());
-  ImGui::SliderFloat("##young", &shown, in_scene / kUsualFactor, in_scene * kUsualFactor,
-                     (number_format(shown) + " kPa").c_str(),
-                     ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
-  ImGui::PopID();
-  if (ImGui::IsItemHovered() && !ImGui::IsItemActive()) {
-    ImGui::SetTooltip("Young's modulus of \"%s\"%s%s%s", material.name.c_str(),
-                      material.shared_with.empty() ? "" : ", also of: ", material.shared_with.c_str(),
-                      "\nTakes effect when you let go");
-  }
-  if (ImGui::IsItemActive()) asked_young_ = AskedYoung{material.name, shown, kFramesUntilBuilding};
-  if (ImGui::IsItemDeactivatedAfterEdit()) {
-    result.actions.push_back(
-        {.verb = ViewVerb::change, .change = {Key::young, material.name, glm::dvec3(1e3 * shown, 0.0, 0.0)}});
-  }
+  const Slid slid = slide(("##young " + material.name).c_str(), shown, in_scene / kUsualFactor,
+                          in_scene * kUsualFactor, number_format(shown) + " kPa", true);
+  tip("Young's modulus of \"" + material.name + "\"" +
+      (material.shared_with.empty() ? "" : ", also of: " + material.shared_with) +
+      "\nTakes effect when you let go");
+  if (slid.held) asked_young_ = AskedYoung{material.name, shown, kFramesUntilBuilding};
+  if (!slid.let_go) return;
+  result.actions.push_back(
+      {.verb = ViewVerb::change, .change = {Key::young, material.name, glm::dvec3(1e3 * shown, 0.0, 0.0)}});
 }
 
 void Panels::draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
@@ -111,60 +87,46 @@ void Panels::draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFr
   };
   if (asked_young_ && !frame.notes.building.empty()) asked_young_->frames_left = 1;
   if (asked_young_ && frame.notes.building.empty() && --asked_young_->frames_left < 0) asked_young_.reset();
-  if (two_choices(pen, "felt", choices.as_rigid, "by its voxels", "as rigid", choices.other_model))
+  begin_fixed(!choices.open);
+  if (took_other(pen, "felt", "##felt", choices.as_rigid, {"by its voxels", "as rigid"}, choices.other_model))
     ask(Key::model, choices.as_rigid ? 0.0 : 1.0);
   if (!choices.as_rigid) {
-    if (two_choices(pen, "energy", choices.trilinear, "six-link", "trilinear", choices.other_energy))
+    if (took_other(pen, "energy", "##energy", choices.trilinear, {"six-link", "trilinear"},
+                   choices.other_energy))
       ask(Key::energy, choices.trilinear ? 0.0 : 1.0);
     label_beside(pen, "spacing");
-    if (ImGui::BeginCombo("##spacing", choices.spacing_words.c_str())) {
-      for (const SpacingChoice& other : choices.spacings) {
-        if (ImGui::Selectable(other.words.c_str())) ask(Key::spacing, other.spacing_m);
-      }
-      ImGui::EndCombo();
-    }
+    std::vector<std::string> words;
+    for (const SpacingChoice& other : choices.spacings) words.push_back(other.words);
+    if (const auto taken = choose("##spacing", choices.spacing_words, words))
+      ask(Key::spacing, choices.spacings[*taken].spacing_m);
     for (const MaterialChoice& material : choices.materials) draw_young(pen, material, result);
   }
-  if (!choices.note.empty()) {
-    ImGui::PushTextWrapPos();
-    ImGui::TextDisabled("%s", choices.note.c_str());
-    ImGui::PopTextWrapPos();
-  }
+  end_fixed();
+  if (!choices.note.empty()) write(choices.note, true);
 }
 
 void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
   if (!frame.notes.building.empty()) {
-    ImGui::PushTextWrapPos();
-    ImGui::TextDisabled("%s", frame.notes.building.c_str());
-    ImGui::PopTextWrapPos();
+    write(frame.notes.building, true);
     return;
   }
   const ChangeEffect& effect = *frame.notes.effect;
-  const std::optional<ChangeMark>& mark = frame.history.last_change();
-  ImGui::PushTextWrapPos();
-  ImGui::TextUnformatted(effect.words.c_str());
-  ImGui::PopTextWrapPos();
-  if (!ImGui::BeginTable("effect", 3)) return;
-  ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
-  ImGui::TableSetupColumn("before", ImGuiTableColumnFlags_WidthFixed, pen.width("8 888 888 N"));
-  ImGui::TableSetupColumn("after", ImGuiTableColumnFlags_WidthFixed, pen.width("8 888 888 N"));
-  effect_row(pen, "", "before", "after");
-  effect_row(pen, "force at that place", force_words(effect.before_N), force_words(effect.after_N));
-  if (mark) {
+  write(effect.words);
+  std::vector<std::array<std::string, 3>> rows{
+      {"", "before", "after"},
+      {"force at that place", force_words(effect.before_N), force_words(effect.after_N)}};
+  if (const std::optional<ChangeMark>& mark = frame.history.last_change()) {
     constexpr double ever = std::numeric_limits<double>::infinity();
     const TickTimes after = frame.history.times(mark->t_s, ever);
-    effect_row(pen, "largest force, 5 s", force_text(mark->most_before_N),
-               force_text(frame.history.most_N(ForceSeries::total, mark->t_s, ever)));
-    effect_row(pen, "tick, median", time_words(mark->before.p50_us), time_words(after.p50_us));
-    effect_row(pen, "tick, 99 %", time_words(mark->before.p99_us), time_words(after.p99_us));
+    rows.push_back({"largest force, 5 s", force_text(mark->most_before_N),
+                    force_text(frame.history.most_N(ForceSeries::total, mark->t_s, ever))});
+    rows.push_back({"tick, median", time_words(mark->before.p50_us), time_words(after.p50_us)});
+    rows.push_back({"tick, 99 %", time_words(mark->before.p99_us), time_words(after.p99_us)});
   }
-  effect_row(pen, "voxels", grouped(effect.voxels_before), grouped(effect.voxels_after));
-  ImGui::EndTable();
+  rows.push_back({"voxels", grouped(effect.voxels_before), grouped(effect.voxels_after)});
+  write_rows(pen, "effect", rows);
   const std::string verdict = verdict_on(effect);
-  if (verdict.empty()) return;
-  ImGui::PushTextWrapPos();
-  ImGui::TextUnformatted(verdict.c_str());
-  ImGui::PopTextWrapPos();
+  if (!verdict.empty()) write(verdict);
 }
 
 }  // namespace hybrid

@@ -11,6 +11,7 @@
 #include "hybrid/view/layout.h"
 #include "hybrid/view/overlay_panel.h"
 #include "hybrid/view/text_painter.h"
+#include "hybrid/window/move_handles.h"
 #include "hybrid/window/tick_history.h"
 #include "hybrid/window/ui_input.h"
 #include "hybrid/window/view_state.h"
@@ -35,6 +36,9 @@ struct PanelFrame {
   const TickHistory& history;
   const SessionNotes& notes;
   const UiInput& input;
+  const Camera& camera;
+  const PixelRect& scene_place;          // of the scene in the frame
+  const MoveHandles* handles = nullptr;  // null: none are shown
 };
 
 struct PanelResult {
@@ -64,12 +68,12 @@ class Panels final : public OverlayPanel {
                    PanelResult& result);
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
                    PanelResult& result);
-  void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
   // ---- panel_choices.cpp ----
   void draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
   void draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result);
   void draw_effect(const Pen& pen, const PanelFrame& frame) const;
-  // ----
+  // ---- panel_view.cpp ----
+  void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
   void draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const;
 
   const PanelFrame* frame_ = nullptr;
@@ -91,8 +95,9 @@ class Panels final : public OverlayPanel {
   std::optional<AskedYoung> asked_young_;
 };
 
-// Writes a label at the left; the next control comes beside it.
-void label_beside(const Pen& pen, const std::string& words);
+// Draws the arrows by which an object is moved (panel_handles.cpp).
+void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera& camera,
+                       const PixelRect& where);
 
 // ---- charts (panel_charts.cpp) ----
 // Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in

@@ -42,7 +42,7 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 30> kScriptCommands{
+constexpr std::array<ScriptCommand, 31> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
      {"speed", ViewVerb::speed, ScriptArguments::number, "speed 0.1"},
@@ -53,6 +53,7 @@ constexpr std::array<ScriptCommand, 30> kScriptCommands{
      {"spacing", ViewVerb::change, ScriptArguments::spacing, "spacing brain 2.5"},
      {"young", ViewVerb::change, ScriptArguments::young, "young fat 3000"},
      {"move", ViewVerb::change, ScriptArguments::move, "move plate 0 0 2"},
+     {"arrows", ViewVerb::arrows, ScriptArguments::on_or_off, "arrows on"},
      {"select", ViewVerb::select, ScriptArguments::object, "select bone"},
      {"show", ViewVerb::show, ScriptArguments::object, "show bone"},
      {"hide", ViewVerb::show, ScriptArguments::object, "hide bone"},

@@ -138,6 +138,9 @@ void act(ViewState& state, const ViewAction& action) {
     case ViewVerb::look:
       state.look = action.text;
       return;
+    case ViewVerb::arrows:
+      set_or_flip(state.moves, action);
+      return;
     case ViewVerb::panels:
       set_or_flip(state.panels, action);
       return;

@@ -20,6 +20,7 @@ enum class ViewVerb : std::uint8_t {
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
   change,          // change: of the scene, which is built again
+  arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
   select,          // object
   show,            // object, numbers: 1 visible, 0 hidden
   opacity,         // object, numbers: 0 to 1
@@ -58,6 +59,7 @@ struct ViewState {
   ViewSettings view;
   bool panels = true;
   std::uint32_t selected = Edit::kTool;
+  bool moves = false;  // arrows on the selected object are shown
   // ---- requests to the session; the owner of the session takes counters and lists ----
   bool paused = false;
   double speed = 1.0;
@@ -68,6 +70,9 @@ struct ViewState {
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look
 };
+
+// A change of the scene is shown as asked for, although nothing is built yet, for so many frames at most.
+inline constexpr int kFramesUntilBuilding = 30;
 
 // Least speed, as a share of real time. Speeds up to 1 are allowed.
 inline constexpr double kLeastSpeed = 1e-3;

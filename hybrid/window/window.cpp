@@ -50,7 +50,7 @@ struct CloseWindow {
   void operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
 };
 
-enum class Drag { none, orbit, pan, tool, slice };
+enum class Drag { none, orbit, pan, tool, slice, object };
 
 constexpr int kMostPixels = 8192;    // most pixels along a side of a frame
 constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets
@@ -100,6 +100,7 @@ struct Window::State {
   glm::dvec3 device_m{0.0};  // device position in the last frame
   SoftBox box;               // of the scene
   std::size_t dragged_slice = 0;
+  ObjectMover mover;
   std::optional<glm::dvec3> goal_m;
   ViewState user;
   UiInput input;
@@ -155,6 +156,9 @@ struct Window::State {
       case Drag::slice:
         drag_slice({dx, dy});
         break;
+      case Drag::object:
+        mover.drag(camera, layout.scene, text_height(height), {dx, dy});
+        break;
       case Drag::none:
         break;
     }
@@ -182,7 +186,10 @@ struct Window::State {
     if (which > GLFW_MOUSE_BUTTON_MIDDLE) return;
     input.press_button(static_cast<std::size_t>(which), pressed && over_panel());
     if (!pressed) {
-      drag = Drag::none;
+      if (std::exchange(drag, Drag::none) == Drag::object) {
+        if (const auto change = mover.let_go(*scene))
+          hybrid::act(user, {.verb = ViewVerb::change, .change = *change});
+      }
       goal_m.reset();
       return;
     }
@@ -197,6 +204,10 @@ struct Window::State {
       grip_m = drag_plane_m - under_pointer();
       goal_m = drag_plane_m;
     } else if (which == GLFW_MOUSE_BUTTON_LEFT) {
+      if (mover.take(camera, layout.scene, text_height(height), {x, y})) {
+        drag = Drag::object;
+        return;
+      }
       const auto slice =
           slice_at(slice_frames(box, user.view), camera, layout.scene, {x, y}, text_height(height));
       drag = slice ? Drag::slice : Drag::orbit;
@@ -275,7 +286,8 @@ struct Window::State {
   }
 
   void paint(const Snapshot& snapshot, const SessionNotes& notes) {
-    const PanelFrame panel{user, history, notes, input};
+    mover.place(user, *scene, !notes.building.empty());
+    const PanelFrame panel{user, history, notes, input, camera, layout.scene, mover.handles()};
     FrameOptions options;
     options.width = std::min(width, kMostPixels);
     options.height = std::min(height, kMostPixels);
@@ -349,6 +361,7 @@ void Window::show_scene(const DrawnScene& scene, std::optional<double> changed_a
   go_to_scene(s.user, *s.scene, scene);
   s.scene = &scene;
   s.box = soft_box(scene);
+  s.mover = {};
   s.painter.emplace(scene, Samples::fast, s.height);
   if (changed_at_s) {
     s.history.mark(*changed_at_s);

@@ -15,7 +15,7 @@ struct KeyAction {
   std::string_view text{};
   double number = -1.0;  // negative: none
 };
-constexpr std::array<KeyAction, 25> kKeyActions{
+constexpr std::array<KeyAction, 26> kKeyActions{
     {{"space", ViewVerb::pause},      {"n", ViewVerb::step},
      {"r", ViewVerb::restart},        {"1", ViewVerb::speed, {}, 1.0},
      {"2", ViewVerb::speed, {}, 0.1}, {"3", ViewVerb::speed, {}, 0.01},
@@ -24,11 +24,11 @@ constexpr std::array<KeyAction, 25> kKeyActions{
      {"z", ViewVerb::look, "z"},      {"k", ViewVerb::clip},
      {"[", ViewVerb::clip_place},     {"]", ViewVerb::clip_place},
      {"v", ViewVerb::slice},          {"g", ViewVerb::slice_grey},
-     {"m", ViewVerb::colour},         {"t", ViewVerb::dark},
-     {"h", ViewVerb::panels},         {"i", ViewVerb::inset},
-     {"p", ViewVerb::screenshot},     {"w", ViewVerb::save_recording},
-     {"l", ViewVerb::reload},         {"s", ViewVerb::save_scene},
-     {"escape", ViewVerb::quit}}};
+     {"m", ViewVerb::colour},         {"o", ViewVerb::arrows},
+     {"t", ViewVerb::dark},           {"h", ViewVerb::panels},
+     {"i", ViewVerb::inset},          {"p", ViewVerb::screenshot},
+     {"w", ViewVerb::save_recording}, {"l", ViewVerb::reload},
+     {"s", ViewVerb::save_scene},     {"escape", ViewVerb::quit}}};
 // Keys that only the panel understands.
 constexpr std::array<std::string_view, 14> kPanelKeys{"tab",    "left",      "right", "up",   "down",
                                                       "pageup", "pagedown",  "home",  "end",  "insert",

@@ -20,7 +20,8 @@ const std::string kText =
     "[[soft]]\nname = \"block\"\nformula = \"block\"\nsize = [20, 20, 10]\nspacing = 2 # mm\nmaterial = "
     "\"gel\"\n"
     "[[soft]]\nname = \"pad\"\nformula = \"block\"\nsize = [20, 20, 10]\nspacing = 2\nposition = [60, 0, 0]\n"
-    "material = \"fat\"\nmaterials = { \"2\" = \"gel\" }\nmodel = \"proxy\"\n"
+    "material = \"fat\"\nlayers = [{ thickness = 4, label = 2 }]\nmaterials = { \"2\" = \"gel\" }\nmodel = "
+    "\"proxy\"\n"
     "[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 4\nposition = [12, 0, 8]\n"
     "[path]\nkind = \"press\"\nfrom = [0, 0, 20]\nto = [0, 0, 9]\n";
 

@@ -214,6 +214,7 @@ TEST(ViewState, LooksAndSelectionGoWithTheObjectsName) {
   EXPECT_EQ(state.selected, 0U);
   EXPECT_FLOAT_EQ(state.view.look_of(0).opacity, 0.3F);
   EXPECT_FLOAT_EQ(state.view.look_of(1).opacity, 1.0F);
+  before = after;
   after.objects.erase(after.objects.begin());
   hybrid::go_to_scene(state, before, after);
   EXPECT_EQ(state.selected, Edit::kTool) << "the object is gone";
