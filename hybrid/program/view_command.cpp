@@ -348,7 +348,11 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
     const WindowInput input = live.window.take_input();
     PlayRequest request = request_of(input);
     for (const Edit& edit : input.edits) player.edit(edit);
-    for (const SceneChange& change : input.changes) live.changer.ask(change);
+    if (player.is_real() && !input.changes.empty())
+      live.files.say("The scene is as it was: with a real device it does not change while it is felt.");
+    for (const SceneChange& change : input.changes) {
+      if (!player.is_real()) live.changer.ask(change);
+    }
     if (take_changed_scene(live, viewed, session, request)) {
       request.asked = nullptr;
       watch = {};

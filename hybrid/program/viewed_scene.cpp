@@ -59,7 +59,9 @@ void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const P
   viewed.drawn =
       drawn_scene(scene, viewed.built, scene.title.empty() ? command.scene.stem().string() : scene.title);
   if (!scene.real_device) viewed.drawn.path_m = places_along(*scene_path(scene));
-  add_choices(read_scene_text(viewed.text, command.scene), viewed.drawn);
+  Scene as_read = read_scene_text(viewed.text, command.scene);
+  as_read.real_device = scene.real_device;  // the command may have chosen another one
+  add_choices(as_read, viewed.drawn);
 }
 
 void SceneChanger::start(const ViewedScene& played) {

@@ -95,6 +95,15 @@ ObjectChoices choices_of(const Scene& as_read, const TunableObject& object, cons
   return choices;
 }
 
+std::string why_fixed_while_felt(const Scene& as_read) {
+  if (as_read.real_device) return "fixed while it is felt with a real device";
+  for (const RigidDescription& rigid : as_read.rigid) {
+    if (!std::holds_alternative<std::monostate>(rigid.motion))
+      return "fixed while it is felt, because \"" + rigid.name + "\" moves";
+  }
+  return {};
+}
+
 // ---- the text ----
 
 void set(SceneTextEditor& editor, const TextTable& table, const std::string& key, const std::string& value) {
@@ -148,10 +157,7 @@ void move(SceneTextEditor& editor, const Scene& as_read, const SceneChange& chan
 }  // namespace
 
 void add_choices(const Scene& as_read, DrawnScene& drawn) {
-  const auto moves = std::ranges::find_if(as_read.rigid, [](const RigidDescription& rigid) {
-    return !std::holds_alternative<std::monostate>(rigid.motion);
-  });
-  const bool open = moves == as_read.rigid.end();
+  const std::string why_fixed = why_fixed_while_felt(as_read);
   for (const TunableObject& changeable : changeable_objects(as_read)) {
     const std::string& name = changeable.own.object;
     const auto soft = std::ranges::find(as_read.soft, name, &SoftDescription::name);
@@ -160,8 +166,8 @@ void add_choices(const Scene& as_read, DrawnScene& drawn) {
     }
   }
   for (DrawnObject& object : drawn.objects) {
-    object.choices.open = open;
-    if (!open) object.choices.note = "fixed while it is felt, because \"" + moves->name + "\" moves";
+    object.choices.open = why_fixed.empty();
+    if (!why_fixed.empty()) object.choices.note = why_fixed;
   }
 }
 

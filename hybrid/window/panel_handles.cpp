@@ -36,7 +36,7 @@ void draw_box(const Pen& pen, const MoveHandles& handles, const Camera& camera, 
     for (unsigned d = 0; d < 3; ++d) {
       const unsigned other = n | 1U << d;
       if (other == n || !corners[n] || !corners[other]) continue;
-      pen.line(glm::vec2(*corners[n]), glm::vec2(*corners[other]), pen.inks.force, 1.5F);
+      pen.line(glm::vec2(*corners[n]), glm::vec2(*corners[other]), pen.inks.force, 0.12F * pen.em);
     }
   }
 }
@@ -56,14 +56,14 @@ void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera&
     if (!pixels[n]) continue;
     const Ink ink = ink_of(kAxes[n]);
     const glm::vec2 tip(*pixels[n]);
-    const float thick = handles.held == n ? 4.0F : 2.5F;
-    pen.line(from, tip, pen.inks.paper, thick + 2.0F);
+    const float thick = (handles.held == n ? 0.3F : 0.2F) * pen.em;
+    pen.line(from, tip, pen.inks.paper, 2.0F * thick);
     pen.line(from, tip, ink, thick);
     pen.fill(tip - radius, tip + radius, ink, radius);
     pen.label(tip.x + 0.9F * pen.em, tip.y - 0.6F * pen.em, ink, kNames[n]);
   }
   pen.fill(from - radius, from + radius, pen.inks.paper, radius);
-  pen.circle(from, radius, pen.inks.text, 2.0F);
+  pen.circle(from, radius, pen.inks.text, 0.15F * pen.em);
   if (moved) pen.label(from.x + pen.em, from.y + pen.em, pen.inks.text, shift_text(handles.shift_m));
 }
 
