@@ -12,8 +12,8 @@
 namespace hybrid {
 
 // The choices of each drawn object. None is open if a rigid object moves, or with a real device, whose hand
-// would not stand still meanwhile. `as_read`: from read_scene(), with models as written. Opens volumes whose
-// spacing the scene does not give. Throws SceneError, std::exception.
+// would not stand still meanwhile. `as_read`: from read_scene(), with models as written. Reads the
+// headers of volumes. Throws SceneError, std::exception.
 void add_choices(const Scene& as_read, DrawnScene& drawn);
 
 // The scene's text after the changes; comments stay. Throws SceneError if `text` is no scene, and
