@@ -47,20 +47,29 @@ ForcesHere forces_here(const World& world, const WorldState& state) {
   return here;
 }
 
+// Memory of a state (bytes) without the lattices, which all states of a scene share.
+std::size_t bytes_of(const WorldState& state) {
+  std::size_t bytes = sizeof state + state.map.memory_bytes();
+  for (const auto& object : state.soft) bytes += object->memory_bytes() - object->lattice().memory_bytes();
+  for (const auto& queries : state.obstacle_queries) bytes += queries.capacity() * sizeof queries.front();
+  return bytes;
+}
+
 }  // namespace
 
 glm::dvec3 SteeredPath::position(double t_s) const noexcept {
-  return dragged_ ? goal_m_ : path_->position(std::fmod(t_s - start_s_, path_->duration_s() + 1.0));
+  return now_.dragged ? now_.goal_m
+                      : path_->position(std::fmod(t_s - now_.start_s, path_->duration_s() + 1.0));
 }
 
 void SteeredPath::drag_to(const glm::dvec3& goal_m) noexcept {
-  dragged_ = true;
-  goal_m_ = goal_m;
+  now_.dragged = true;
+  now_.goal_m = goal_m;
 }
 
 void SteeredPath::restart(double now_s) noexcept {
-  dragged_ = false;
-  start_s_ = now_s;
+  now_.dragged = false;
+  now_.start_s = now_s;
 }
 
 Player::Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
@@ -113,6 +122,8 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
   built_ = &built;
   drawn_ = &drawn;
   changes_.push_back({.tick = ticks_, .edits_before = applied_.size(), .text = text});
+  kept_.clear();
+  ++scenes_;
   edited_ = true;
   ChangeEffect effect{.t_s = t_s(), .voxels_before = before.voxels, .voxels_after = after.voxels};
   if (before.force_N) effect.before_N = glm::length(*before.force_N);
@@ -120,6 +131,68 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
   if (before.force_N && after.force_N)
     effect.difference_jnd = jnd_of(*after.force_N, *before.force_N, jnd_floor_N(scene));
   return effect;
+}
+
+bool Player::keeps_now() const noexcept {
+  return !is_real() &&
+         (kept_.empty() || t_s() - dt_s_ * static_cast<double>(kept_.back().ticks) >= kKeepEvery_s);
+}
+
+void Player::keep_state() {
+  if (!keeps_now()) return;
+  take_edits();
+  KeptState now{.ticks = ticks_,
+                .hash = hash_,
+                .edits = applied_.size(),
+                .changes = changes_.size(),
+                .state = copy_state(*built_->world, *built_->state),
+                .device = device_.copy(),
+                .steering = path_->steering(),
+                .goal_m = goal_m_,
+                .felt = felt_};
+  now.state->feel = built_->state->feel;
+  now.bytes = bytes_of(*now.state);
+  kept_.push_back(std::move(now));
+  const auto bytes = [this] {
+    std::size_t sum = 0;
+    for (const KeptState& kept : kept_) sum += kept.bytes;
+    return sum;
+  };
+  while (kept_.size() > 1 &&
+         (t_s() - dt_s_ * static_cast<double>(kept_.front().ticks) > kKept_s || bytes() > kMostKeptBytes))
+    kept_.pop_front();
+}
+
+void Player::go_back(std::size_t n) {
+  if (n >= kept_.size()) throw std::runtime_error("that state is no longer kept");
+  if (changes_.size() >= kMostChanges) throw std::runtime_error("the session has changed too often");
+  take_edits();  // those that wait are forgotten with the rest
+  kept_.erase(kept_.begin() + static_cast<std::ptrdiff_t>(n) + 1, kept_.end());
+  const KeptState& kept = kept_.back();
+  built_->state = copy_state(*built_->world, *kept.state);
+  built_->state->feel = kept.state->feel;
+  if (async_) start_async_relaxation(*built_->state, arrival_);
+  (void)device_.go_back_to(*kept.device);
+  path_->steer_as(kept.steering);
+  goal_m_ = kept.goal_m;
+  felt_ = kept.felt;
+  ticks_ = kept.ticks;
+  hash_ = kept.hash;
+  due_ = 0.0;
+  whole_ = whole_ || recorded_.size() >= kept.ticks;
+  recorded_.resize(std::min<std::size_t>(recorded_.size(), kept.ticks));
+  applied_.resize(kept.edits);
+  changes_.resize(kept.changes);
+  changes_.push_back({.tick = ticks_, .edits_before = applied_.size(), .text = {}});
+  edited_ = true;
+}
+
+void Player::snapshot_of(const KeptState& kept, Snapshot& out) const {
+  fill_figures(out, *kept.state, kept.felt, kept.ticks);
+  fill_moved(*built_->world, *kept.state, out);
+  for (SoftDent& dent : out.dents) dent.used = false;
+  for (SoftPatch& patch : out.patches) patch = {};
+  out.asked.number = 0;
 }
 
 void Player::take_edits() noexcept {
@@ -185,17 +258,22 @@ void Player::step(const PlayRequest& request) {
   if (advance(request, {.device = device_.read(), .dt_s = dt_s_})) device_.write(felt_.force_N, dt_s_);
 }
 
-void Player::snapshot(Snapshot& out, const AskedPoints* asked) const {
+void Player::fill_figures(Snapshot& out, const WorldState& state, const TickResult& felt,
+                          std::uint64_t ticks) const {
   if (out.scene != scene_number()) out = Snapshot();
   out.scene = scene_number();
-  out.tick = built_->state->tick;
-  out.t_s = t_s();
-  out.device_m = felt_.device_m;
-  out.proxy_m = felt_.proxy_m;
-  out.force_N = felt_.force_N;
-  out.feel = built_->state->feel;
-  out.tick_us = felt_.tick_us;
-  fill_values(*built_->world, *built_->state, *drawn_, out);
+  out.tick = state.tick;
+  out.t_s = dt_s_ * static_cast<double>(ticks);
+  out.device_m = felt.device_m;
+  out.proxy_m = felt.proxy_m;
+  out.force_N = felt.force_N;
+  out.feel = state.feel;
+  out.tick_us = felt.tick_us;
+  fill_values(*built_->world, state, *drawn_, out);
+}
+
+void Player::snapshot(Snapshot& out, const AskedPoints* asked) const {
+  fill_figures(out, *built_->state, felt_, ticks_);
   if (live_) {
     fill_moved_near(*built_->world, *built_->state, out);
   } else {

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -42,11 +43,29 @@ class SteeredPath final : public device::Path {
   void drag_to(const glm::dvec3& goal_m) noexcept;
   void restart(double now_s) noexcept;
 
+  struct Steering {
+    bool dragged = false;
+    glm::dvec3 goal_m{0.0};
+    double start_s = 0.0;  // of the path
+  };
+  [[nodiscard]] const Steering& steering() const noexcept { return now_; }
+  void steer_as(const Steering& steering) noexcept { now_ = steering; }
+
  private:
   std::shared_ptr<const device::Path> path_;
-  bool dragged_ = false;
-  glm::dvec3 goal_m_{0.0};
-  double start_s_ = 0.0;
+  Steering now_;
+};
+
+// The session at an earlier tick.
+struct KeptState {
+  std::uint64_t ticks = 0, hash = 0;
+  std::size_t edits = 0, changes = 0;  // until then
+  std::unique_ptr<WorldState> state;
+  std::unique_ptr<device::HapticDevice> device;
+  SteeredPath::Steering steering;
+  glm::dvec3 goal_m{0.0};
+  TickResult felt;
+  std::size_t bytes = 0;  // memory that it takes
 };
 
 class Player {
@@ -58,6 +77,10 @@ class Player {
   // Ticks whose figures may wait for a frame: eight seconds at 1 kHz.
   static constexpr std::size_t kSamples = 8192;
 
+  // States of the session that are kept to go back to: of the last minute, one a second at most, within this
+  // memory. The oldest are dropped first.
+  static constexpr double kKept_s = 60.0, kKeepEvery_s = 1.0;
+  static constexpr std::size_t kMostKeptBytes = std::size_t{512} << 20;
   // Changes of the scene in a whole session.
   static constexpr std::size_t kMostChanges = 10'000;
 
@@ -76,12 +99,21 @@ class Player {
   // is not possible; the session then goes on as it was. `words` of the result are left to the caller.
   ChangeEffect change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
                             const std::string& text);
+  // ---- going back; call these as change_scene() ----
+  // Keeps the present state, if a second of the session has passed since the last one was kept. Nothing is
+  // kept with a real device. States of an earlier scene are dropped.
+  void keep_state();
+  [[nodiscard]] bool keeps_now() const noexcept;
+  // The session goes on from kept state number `n`; what came after it is forgotten, by the recording too.
+  void go_back(std::size_t n);
+  // Kept states, the oldest first. Only the thread that keeps them may call these.
+  [[nodiscard]] const std::deque<KeptState>& kept() const noexcept { return kept_; }
+  void snapshot_of(const KeptState& kept, Snapshot& out) const;
+
   // The thread that relaxes the tissue of the present scene, for a session that went live.
   [[nodiscard]] std::unique_ptr<RelaxationThread> relaxation_thread(double surfaces_hz);
   // Number of scenes before the present one.
-  [[nodiscard]] std::uint32_t scene_number() const noexcept {
-    return static_cast<std::uint32_t>(changes_.size());
-  }
+  [[nodiscard]] std::uint32_t scene_number() const noexcept { return scenes_; }
 
   // ---- the servo thread; neither allocates, locks or throws ----
   // Takes edits, and does one tick if one is due. Returns true if there was a tick.
@@ -124,6 +156,8 @@ class Player {
   [[nodiscard]] bool tick_is_due(const PlayRequest& request) noexcept;
   void steer(const PlayRequest& request) noexcept;
   void keep(device::DeviceFault fault) noexcept;
+  void fill_figures(Snapshot& out, const WorldState& state, const TickResult& felt,
+                    std::uint64_t ticks) const;
 
   const Scene* scene_;
   BuiltScene* built_;
@@ -142,6 +176,8 @@ class Player {
   std::vector<RecordedTick> recorded_;
   std::vector<Edit> applied_;
   std::vector<RecordedChange> changes_;
+  std::deque<KeptState> kept_;
+  std::uint32_t scenes_ = 0;
   SpscRing<Edit> edits_{kEditsWaiting};
   TickSamples samples_{kSamples};
   std::atomic<std::uint32_t> held_{0};

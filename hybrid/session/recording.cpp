@@ -16,6 +16,7 @@
 #include "hybrid/build/choose_model.h"
 #include "hybrid/scene/read_scene_text.h"
 #include "hybrid/scene/toml_tree.h"
+#include "hybrid/session/equilibrium.h"
 #include "hybrid/tick/take_over.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/work_budget.h"
@@ -277,6 +278,12 @@ class ReplayedScene {
     apply_edits_of_tick(world(), state(), std::span(recording_.edits).first(end), tick, next_edit_);
   }
   void take_change(const RecordedChange& change) {
+    if (change.text.empty()) {
+      // The session was copied when the state was kept, and once more when it went back to it.
+      built_.state = copy_state(world(), *copy_state(world(), state()));
+      start_relaxation(state());
+      return;
+    }
     BuiltScene next = build(scene_of_text(recording_, change.text));
     if (!why_no_take_over(world(), *next.world).empty() ||
         !take_over(world(), state(), *next.world, *next.state))

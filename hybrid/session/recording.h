@@ -12,11 +12,12 @@
 
 namespace hybrid {
 
-// The session goes on in another scene before this tick (take_over.h).
+// Before this tick the session goes on in another scene (take_over.h), or from a copy of its own state, to
+// which it went back.
 struct RecordedChange {
   std::uint64_t tick = 0;
   std::uint64_t edits_before = 0;  // number of edits that were applied in the scenes before
-  std::string text;                // of the scene from then on
+  std::string text;                // of the scene from then on; empty: the same scene, in a copy of its state
 };
 
 struct Recording {
