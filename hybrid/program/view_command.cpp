@@ -1,23 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer: a window and a session, each on a thread of its own. The session publishes snapshots and the
-// figures of every tick, and takes goals and edits. Neither waits for the other.
+// The viewer: a window, and a session on a thread of its own (live_session.h).
 #include <fmt/format.h>
 
-#include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
-#include <thread>
+#include <utility>
 
-#include "device/loop/servo_loop.h"
 #include "device/loop/stop_signal.h"
-#include "hybrid/base/flush_to_zero.h"
-#include "hybrid/base/triple_buffer.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
 #include "hybrid/program/viewed_scene.h"
+#include "hybrid/session/live_session.h"
 #include "hybrid/session/real_device.h"
-#include "hybrid/snapshot/merge_live_surface.h"
 #include "hybrid/window/frame_meter.h"
 #include "hybrid/window/video.h"
 #include "hybrid/window/view_script.h"
@@ -26,7 +22,6 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSnapshotEvery_s = 1.0 / 60.0;  // session time between two pictures of a live view
 constexpr int kScriptFrames_per_s = 30;
 constexpr double kScriptFrame_s = 1.0 / kScriptFrames_per_s;  // session time of one frame of a scripted view
 
@@ -98,6 +93,42 @@ void ask_video(const ViewCommand& command) {
   require_ffmpeg();
 }
 
+// The past states that the window shows, and from which the session goes on.
+class PastView {
+ public:
+  // Fills the notes with the kept states. `now_s`: time of the session.
+  static void add_notes(const Player& player, double now_s, SessionNotes& notes) {
+    for (const KeptState& kept : player.kept()) {
+      notes.kept_s.push_back(now_s - player.time_of(kept));
+      notes.kept_bytes += kept.bytes;
+    }
+  }
+  // The kept state that is shown; empty: the present.
+  static std::optional<std::size_t> shown(const Player& player, double now_s, double back_s) {
+    if (!(back_s > 0.0) || player.kept().empty()) return {};
+    std::size_t nearest = 0;
+    const auto apart = [&](std::size_t n) {
+      return std::abs(now_s - back_s - player.time_of(player.kept()[n]));
+    };
+    for (std::size_t n = 1; n < player.kept().size(); ++n) {
+      if (apart(n) < apart(nearest)) nearest = n;
+    }
+    return nearest;
+  }
+  // The picture of that state.
+  const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked) {
+    player.snapshot_of(player.kept()[n], snapshot_, asked);
+    return snapshot_;
+  }
+
+ private:
+  Snapshot snapshot_;
+};
+
+void leave_the_past(Window& window) {
+  window.act({.verb = ViewVerb::look_back, .numbers = {0.0}});
+}
+
 // Plays frames that each cover a fixed time, so that the pictures are the same on any machine. Returns the
 // exit status.
 int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
@@ -109,6 +140,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
   ViewFiles files(command);
   SceneChanger changer(command);
   std::optional<ChangeEffect> effect;
+  PastView past;
   FrameMeter meter;
   std::optional<VideoFile> video;
   double ahead_s = 0.0;  // simulated time that the frames are ahead of the ticks
@@ -128,6 +160,13 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     } catch (const std::exception& e) {
       files.say(std::string("The scene is as it was: ") + e.what());
     }
+    const auto back = PastView::shown(player, player.t_s(), input.back_s);
+    if (back && input.go_on) {
+      player.go_back(*back);
+      leave_the_past(window);
+    }
+    const bool shows_past = back && !input.go_on;
+    request.paused = request.paused || shows_past;
     for (ahead_s += kScriptFrame_s; ahead_s > 0.5 / player.rate_hz(); ahead_s -= 1.0 / player.rate_hz()) {
       if (drag) {
         request.dragging = true;
@@ -135,11 +174,16 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
       }
       player.step(request);
     }
+    player.keep_state();
     player.snapshot(snapshot, request.asked.get());
-    snapshot.presses = input.wants_presses ? player.presses() : std::vector<PairPress>();
+    snapshot.presses = input.wants_presses && !shows_past ? player.presses() : std::vector<PairPress>();
+    SessionNotes notes = notes_of(player, snapshot.t_s, files.message(), effect);
+    PastView::add_notes(player, snapshot.t_s, notes);
+    const Snapshot& seen =
+        shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(snapshot);
     meter.end_session();
     window.add_ticks(player.samples());
-    if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message(), effect))) break;
+    if (!window.frame(seen, notes)) break;
     meter.end();
     if (!command.out.empty()) save_frame(window, frame_file(command.out, n));
     add_to_video(command, window, video);
@@ -156,115 +200,6 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
   fmt::print("{}\n", meter.in_words());
   return files.save_at_end(*viewed) ? 0 : 1;
 }
-
-// The session on its own thread, while a window shows it.
-class LiveSession {
- public:
-  LiveSession(ViewedScene& viewed, BlackBox& box)
-      : player_(*viewed.player), relaxation_(player_.go_live(1.0 / kSnapshotEvery_s)), box_(box) {
-    player_.snapshot(snapshots_.back());
-    snapshots_.publish();
-    thread_ = std::jthread([this] { serve(); });
-  }
-  LiveSession(const LiveSession&) = delete;
-  LiveSession& operator=(const LiveSession&) = delete;
-  LiveSession(LiveSession&&) = delete;
-  LiveSession& operator=(LiveSession&&) = delete;
-  ~LiveSession() { stop(); }
-
-  void ask(const PlayRequest& request) {
-    asked_ = request.asked;
-    requests_.back() = request;
-    requests_.publish();
-  }
-  void shown(const DrawnScene& drawn, Snapshot& snapshot) {
-    relaxation_->ask(asked_);
-    merge_live_surface(drawn, snapshots_.take(), relaxation_->tissue(), asked_.get(), snapshot);
-  }
-  // Waits until the servo thread leaves the state alone. Returns false if it does not answer.
-  bool hold(PlayRequest request) {
-    request.hold = ++holds_;
-    ask(request);
-    for (int n = 0; n < kMostWaits && !ended_; ++n) {
-      if (player_.held() == request.hold) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    return ended_;
-  }
-  // The session goes on in another scene. It stands still meanwhile. Throws std::exception if that is not
-  // possible.
-  ChangeEffect change_scene(PlayRequest request, ViewedScene& next) {
-    if (!hold(request)) throw std::runtime_error("the session does not answer; try again");
-    relaxation_.reset();
-    request.asked = nullptr;  // the points belong to the scene before
-    const auto go_on = [&] {
-      relaxation_ = player_.relaxation_thread(1.0 / kSnapshotEvery_s);
-      ask(request);
-    };
-    try {
-      const ChangeEffect effect = player_.change_scene(next.scene, next.built, next.drawn, next.text);
-      go_on();
-      for (int n = 0; n < kMostWaits && !ended_ && snapshots_.take().scene != player_.scene_number(); ++n)
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      return effect;
-    } catch (...) {
-      go_on();
-      throw;
-    }
-  }
-  [[nodiscard]] bool ended() const { return ended_; }
-  device::ServoReport stop() {
-    stop_ = true;
-    if (thread_.joinable()) thread_.join();
-    return report_;
-  }
-
- private:
-  static constexpr int kMostWaits = 500;  // waits of 1 ms each
-
-  device::ServoAnswer answer(const device::ServoInput& input) {
-    const ScopedFlushToZero flushed;
-    const bool go_on = !stop_.load(std::memory_order_relaxed);
-    if (!go_on) return {.go_on = false, .skip = true};
-    const bool ticked = player_.advance(requests_.take(), input);
-    if (ticked) box_.add(black_box_row(input, player_.felt(), player_.ticks() - 1, player_.state()));
-    if (ticked || player_.edited()) publish(ticked);
-    return {.force_N = player_.felt().force_N, .skip = !ticked};
-  }
-  // Publishes a snapshot, at most 60 times a second of real time.
-  void publish(bool ticked) {
-    const auto now = std::chrono::steady_clock::now();
-    if (ticked && now < next_) return;
-    next_ = now + std::chrono::microseconds(static_cast<int>(1e6 * kSnapshotEvery_s));
-    player_.shown();
-    player_.snapshot(snapshots_.back(), requests_.take().asked.get());
-    snapshots_.publish();
-  }
-  void serve() {
-    auto tick = [this](const device::ServoInput& input) { return answer(input); };
-    try {
-      report_ = device::run_servo(
-          player_.device(),
-          {.rate_hz = player_.rate_hz(), .realtime = true, .deadline_s = player_.deadline_s()}, tick);
-    } catch (const std::exception& e) {
-      report_.end = device::ServoEnd::lost;
-      report_.messages.emplace_back(e.what());
-    }
-    ended_ = true;
-  }
-
-  Player& player_;
-  std::unique_ptr<RelaxationThread> relaxation_;
-  BlackBox& box_;
-  TripleBuffer<Snapshot> snapshots_;
-  TripleBuffer<PlayRequest> requests_;
-  std::shared_ptr<const AskedPoints> asked_;  // of the last request
-  std::atomic<bool> stop_{false}, ended_{false};
-  std::chrono::steady_clock::time_point next_{};
-  std::uint32_t holds_ = 0;
-  device::ServoReport report_;
-  std::jthread thread_;
-};
 
 // Keeps the forces between objects for the window's list. To compute them the session is held for a moment:
 // a simulated hand does not notice, because held time does not count. A real hand would, so with a real
@@ -313,6 +248,7 @@ SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) 
   notes.building = live.changer.building();
   if (!notes.building.empty()) notes.message = notes.building + "; the session goes on meanwhile";
   if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
+  PastView::add_notes(player, t_s, notes);
   if (!live.reload.error().empty())
     notes.error = live.reload.error() + "\nThe session goes on with the scene as it was.";
   return notes;
@@ -324,7 +260,9 @@ bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, 
   try {
     auto next = live.changer.poll(*viewed);
     if (next == nullptr) return false;
-    live.effect = session.change_scene(request, *next);
+    session.change(request, [&] {
+      live.effect = viewed->player->change_scene(next->scene, next->built, next->drawn, next->text);
+    });
     show_changed(live.window, viewed, std::move(next), *live.effect);
     return true;
   } catch (const std::exception& e) {
@@ -333,14 +271,37 @@ bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, 
   }
 }
 
+void go_back(LiveWindow& live, LiveSession& session, const PlayRequest& request, Player& player,
+             std::size_t kept) {
+  try {
+    session.change(request, [&] { player.go_back(kept); });
+    leave_the_past(live.window);
+  } catch (const std::exception& e) {
+    live.files.say(std::string("The session goes on as it was: ") + e.what());
+  }
+}
+
+// Keeps the session's state when it is time. The session stands still for at most one part in 20 of the time.
+void keep_state(LiveSession& session, const PlayRequest& request, const Player& player, double now_s,
+                std::chrono::steady_clock::time_point& next) {
+  constexpr int rest = 19;
+  const auto begin = std::chrono::steady_clock::now();
+  if (begin < next || request.paused || !player.keeps_at(now_s)) return;
+  session.keep_state(request);
+  const auto end = std::chrono::steady_clock::now();
+  next = end + rest * (end - begin);
+}
+
 // Runs the window on this thread and the session on another. Ends when the window closes, or when a changed
 // scene is ready in `next`. Returns the device's events.
 device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, BlackBox& box,
                               std::unique_ptr<ViewedScene>& next) {
-  LiveSession session(*viewed, box);
+  LiveSession session(*viewed->player, box);
   Player& player = *viewed->player;
   Snapshot shown;
   PressWatch watch;
+  PastView past;
+  auto keep_next = std::chrono::steady_clock::now();
   bool open = true;
   while (open && !session.ended() && next == nullptr) {
     live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
@@ -357,11 +318,21 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
       request.asked = nullptr;
       watch = {};
     }
+    const auto back = PastView::shown(player, shown.t_s, input.back_s);
+    if (back && input.go_on) {
+      go_back(live, session, request, player, *back);
+      request.asked = nullptr;
+    }
+    const bool shows_past = back && !input.go_on;
+    request.paused = request.paused || shows_past;
     session.ask(request);
+    if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
     session.shown(viewed->drawn, shown);
     shown.presses = watch.presses(input, request, player, session, shown.tick);
     live.window.add_ticks(player.samples());
-    open = live.window.frame(shown, notes_of(live, player, shown.t_s));
+    open = live.window.frame(
+        shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),
+        notes_of(live, player, shown.t_s));
     live.files.save_what_was_asked(live.window, input, *viewed, shown, [&] { return session.hold(request); });
     if (input.reload) live.reload.ask();
     if (!player.is_real()) next = live.reload.poll();

@@ -133,13 +133,12 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
   return effect;
 }
 
-bool Player::keeps_now() const noexcept {
-  return !is_real() &&
-         (kept_.empty() || t_s() - dt_s_ * static_cast<double>(kept_.back().ticks) >= kKeepEvery_s);
+bool Player::keeps_at(double t_s) const noexcept {
+  return !is_real() && (kept_.empty() || t_s - time_of(kept_.back()) >= kKeepEvery_s);
 }
 
 void Player::keep_state() {
-  if (!keeps_now()) return;
+  if (!keeps_at(t_s())) return;
   take_edits();
   KeptState now{.ticks = ticks_,
                 .hash = hash_,
@@ -158,8 +157,7 @@ void Player::keep_state() {
     for (const KeptState& kept : kept_) sum += kept.bytes;
     return sum;
   };
-  while (kept_.size() > 1 &&
-         (t_s() - dt_s_ * static_cast<double>(kept_.front().ticks) > kKept_s || bytes() > kMostKeptBytes))
+  while (kept_.size() > 1 && (t_s() - time_of(kept_.front()) > kKept_s || bytes() > kMostKeptBytes))
     kept_.pop_front();
 }
 
@@ -187,12 +185,11 @@ void Player::go_back(std::size_t n) {
   edited_ = true;
 }
 
-void Player::snapshot_of(const KeptState& kept, Snapshot& out) const {
+void Player::snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked) const {
   fill_figures(out, *kept.state, kept.felt, kept.ticks);
   fill_moved(*built_->world, *kept.state, out);
-  for (SoftDent& dent : out.dents) dent.used = false;
-  for (SoftPatch& patch : out.patches) patch = {};
   out.asked.number = 0;
+  if (asked != nullptr) fill_asked(*built_->world, *kept.state, *asked, false, out);
 }
 
 void Player::take_edits() noexcept {

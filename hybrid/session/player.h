@@ -106,9 +106,14 @@ class Player {
   [[nodiscard]] bool keeps_now() const noexcept;
   // The session goes on from kept state number `n`; what came after it is forgotten, by the recording too.
   void go_back(std::size_t n);
-  // Kept states, the oldest first. Only the thread that keeps them may call these.
+  // Kept states, the oldest first. Only the thread that keeps them may call these four.
   [[nodiscard]] const std::deque<KeptState>& kept() const noexcept { return kept_; }
-  void snapshot_of(const KeptState& kept, Snapshot& out) const;
+  // Has a second of the session passed since a state was kept? Never with a real device.
+  [[nodiscard]] bool keeps_at(double t_s) const noexcept;
+  [[nodiscard]] double time_of(const KeptState& kept) const noexcept {
+    return dt_s_ * static_cast<double>(kept.ticks);
+  }
+  void snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked = nullptr) const;
 
   // The thread that relaxes the tissue of the present scene, for a session that went live.
   [[nodiscard]] std::unique_ptr<RelaxationThread> relaxation_thread(double surfaces_hz);

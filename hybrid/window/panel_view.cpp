@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The panel's controls of the view: directions, clip plane, slices, colours.
+// The panel's controls of the view: the past, directions, clip plane, slices, colours.
 #include <array>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "hybrid/base/number_text.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/window/controls.h"
 #include "hybrid/window/panels.h"
@@ -10,6 +13,28 @@
 namespace hybrid {
 
 using namespace controls;
+
+// Time runs to the right, and the present is at the right end.
+void Panels::draw_past(const Pen& pen, const PanelFrame& frame, PanelResult& result) const {
+  const SessionNotes& notes = frame.notes;
+  const bool none = notes.kept_s.empty();
+  label_beside(pen, "back to");
+  auto at = static_cast<float>(-frame.state.back_s);
+  const std::string words =
+      frame.state.back_s > 0.0 ? with_decimals(frame.state.back_s, 1) + " s ago" : "now";
+  begin_fixed(none || notes.real_device);
+  const float oldest = none ? -1.0F : static_cast<float>(-notes.kept_s.front());
+  if (slide("##back", at, oldest, 0.0F, words).changed)
+    result.actions.push_back({.verb = ViewVerb::look_back, .numbers = {-static_cast<double>(at)}});
+  tip(std::to_string(notes.kept_s.size()) + " states of the last minute, " +
+      with_decimals(1e-6 * static_cast<double>(notes.kept_bytes), 0) + " MB");
+  end_fixed();
+  if (!(frame.state.back_s > 0.0)) return;
+  const float half = 0.5F * (free_width() - gap());
+  if (button("Go on from here (B)", half)) result.actions.push_back({.verb = ViewVerb::go_on});
+  same_line();
+  if (button("Back to now", half)) result.actions.push_back({.verb = ViewVerb::look_back, .numbers = {0.0}});
+}
 
 void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
                        PanelResult& result) {

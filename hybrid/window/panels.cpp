@@ -403,7 +403,10 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   if (ImGui::Begin(kPanelName, nullptr, flags)) {
     if (frame.input.by_keyboard && !ImGui::IsWindowFocused(ImGuiFocusedFlags_ChildWindows))
       ImGui::SetWindowFocus();
-    if (open_section("Session")) draw_session(frame, snapshot, result);
+    if (open_section("Session")) {
+      draw_session(frame, snapshot, result);
+      draw_past(pen, frame, result);
+    }
     if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
     if (has_soft(scene) && open_section("Forces between objects")) {
       result.wants_presses = true;

@@ -20,12 +20,15 @@ namespace hybrid {
 
 // Data that the session gives its window besides snapshots.
 struct SessionNotes {
-  bool real_device = false;              // slow motion is not possible
-  double recorded_s = 0.0;               // length of the recording so far
-  std::uint64_t refused_edits = 0;       // refused because too many edits waited
-  std::uint64_t unseen_ticks = 0;        // ticks missing in the charts because a frame took too long
-  std::string message{};                 // result of the last action; empty: none
-  std::string error{};                   // error in the scene's file; empty: none
+  bool real_device = false;         // slow motion is not possible
+  double recorded_s = 0.0;          // length of the recording so far
+  std::uint64_t refused_edits = 0;  // refused because too many edits waited
+  std::uint64_t unseen_ticks = 0;   // ticks missing in the charts because a frame took too long
+  std::string message{};            // result of the last action; empty: none
+  std::string error{};              // error in the scene's file; empty: none
+  // Kept states, the oldest first: how long ago they were (s), and the memory of all.
+  std::vector<double> kept_s{};
+  std::size_t kept_bytes = 0;
   std::string building{};                // progress of a changed scene that is built; empty: none
   std::optional<ChangeEffect> effect{};  // of the last change of the scene
 };
@@ -73,6 +76,7 @@ class Panels final : public OverlayPanel {
   void draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result);
   void draw_effect(const Pen& pen, const PanelFrame& frame) const;
   // ---- panel_view.cpp ----
+  void draw_past(const Pen& pen, const PanelFrame& frame, PanelResult& result) const;
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
   void draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const;
 

@@ -42,7 +42,7 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 31> kScriptCommands{
+constexpr std::array<ScriptCommand, 33> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
      {"speed", ViewVerb::speed, ScriptArguments::number, "speed 0.1"},
@@ -53,6 +53,8 @@ constexpr std::array<ScriptCommand, 31> kScriptCommands{
      {"spacing", ViewVerb::change, ScriptArguments::spacing, "spacing brain 2.5"},
      {"young", ViewVerb::change, ScriptArguments::young, "young fat 3000"},
      {"move", ViewVerb::change, ScriptArguments::move, "move plate 0 0 2"},
+     {"back", ViewVerb::look_back, ScriptArguments::number, "back 5"},
+     {"go-on", ViewVerb::go_on, ScriptArguments::none, "go-on"},
      {"arrows", ViewVerb::arrows, ScriptArguments::on_or_off, "arrows on"},
      {"select", ViewVerb::select, ScriptArguments::object, "select bone"},
      {"show", ViewVerb::show, ScriptArguments::object, "show bone"},

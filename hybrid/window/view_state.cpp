@@ -93,6 +93,12 @@ void act_on_session(ViewState& state, const ViewAction& action) {
     case ViewVerb::edit:
       state.edits.push_back({0, action.object, action.quantity, number_of(action)});
       break;
+    case ViewVerb::look_back:
+      state.back_s = std::max(number_of(action), 0.0);
+      break;
+    case ViewVerb::go_on:
+      state.go_on = state.back_s > 0.0;
+      break;
     case ViewVerb::change:
       state.changes.push_back(action.change);
       break;

@@ -20,6 +20,8 @@ enum class ViewVerb : std::uint8_t {
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
   change,          // change: of the scene, which is built again
+  look_back,       // numbers: seconds before now; 0: the present
+  go_on,           // the session goes on from the past that is shown
   arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
   select,          // object
   show,            // object, numbers: 1 visible, 0 hidden
@@ -64,6 +66,8 @@ struct ViewState {
   bool paused = false;
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;
+  double back_s = 0.0;  // how far before now the shown state is; the session pauses meanwhile; 0: the present
+  bool go_on = false;
   std::vector<Edit> edits{};
   std::vector<SceneChange> changes{};
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name

@@ -61,7 +61,7 @@ struct NamedKey {
   int ui;  // UiKey, or -1
 };
 constexpr auto ui = [](UiKey key) { return static_cast<int>(key); };
-constexpr std::array<NamedKey, 17> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::tab)},
+constexpr std::array<NamedKey, 19> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::tab)},
                                                {"left", GLFW_KEY_LEFT, ui(UiKey::left)},
                                                {"right", GLFW_KEY_RIGHT, ui(UiKey::right)},
                                                {"up", GLFW_KEY_UP, ui(UiKey::up)},
@@ -77,7 +77,9 @@ constexpr std::array<NamedKey, 17> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::t
                                                {"enter", GLFW_KEY_ENTER, ui(UiKey::enter)},
                                                {"escape", GLFW_KEY_ESCAPE, ui(UiKey::escape)},
                                                {"[", GLFW_KEY_LEFT_BRACKET, -1},
-                                               {"]", GLFW_KEY_RIGHT_BRACKET, -1}}};
+                                               {"]", GLFW_KEY_RIGHT_BRACKET, -1},
+                                               {",", GLFW_KEY_COMMA, -1},
+                                               {".", GLFW_KEY_PERIOD, -1}}};
 constexpr std::array<std::pair<char, UiKey>, 6> kLetters{
     {{'a', UiKey::a}, {'c', UiKey::c}, {'v', UiKey::v}, {'x', UiKey::x}, {'y', UiKey::y}, {'z', UiKey::z}}};
 
@@ -362,6 +364,7 @@ void Window::show_scene(const DrawnScene& scene, std::optional<double> changed_a
   s.scene = &scene;
   s.box = soft_box(scene);
   s.mover = {};
+  s.user.back_s = 0.0;  // states of the scene before are not kept
   s.painter.emplace(scene, Samples::fast, s.height);
   if (changed_at_s) {
     s.history.mark(*changed_at_s);
@@ -419,12 +422,14 @@ WindowInput Window::take_input() {
           .speed = s.user.speed,
           .restarts = s.user.restarts,
           .single_ticks = s.user.single_ticks,
+          .back_s = s.user.back_s,
           .asked = s.painter->asked(s.user.view),
           .edits = std::exchange(s.user.edits, {}),
           .changes = std::exchange(s.user.changes, {}),
           .recording = std::exchange(s.user.recording, {}),
           .save_scene = std::exchange(s.user.save_scene, false),
-          .reload = std::exchange(s.user.reload, false)};
+          .reload = std::exchange(s.user.reload, false),
+          .go_on = std::exchange(s.user.go_on, false)};
 }
 
 std::optional<std::filesystem::path> Window::take_screenshot() {

@@ -32,12 +32,13 @@ struct WindowInput {
   bool wants_presses = false;  // the frame shows Snapshot::presses
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
+  double back_s = 0.0;                           // as ViewState::back_s
   std::shared_ptr<const AskedPoints> asked;      // points whose displacements the next frame needs, or null
   // ---- since the last call ----
   std::vector<Edit> edits;
   std::vector<SceneChange> changes;
   std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name
-  bool save_scene = false, reload = false;
+  bool save_scene = false, reload = false, go_on = false;
 };
 
 // A frame's pixels: rows from the top, three bytes (RGB) each.
