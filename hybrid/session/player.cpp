@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <stdexcept>
 
 #include "hybrid/base/flush_to_zero.h"
@@ -133,8 +134,12 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
   return effect;
 }
 
+// States are kept as often as they will fit, so that few are copied in vain.
 bool Player::keeps_at(double t_s) const noexcept {
-  return !is_real() && (kept_.empty() || t_s - time_of(kept_.back()) >= kKeepEvery_s);
+  if (is_real()) return false;
+  if (kept_.empty()) return true;
+  const double share = static_cast<double>(kept_.back().bytes) / static_cast<double>(kMostKeptBytes);
+  return t_s - time_of(kept_.back()) >= std::max(kKeepEvery_s, share * kKept_s);
 }
 
 void Player::keep_state() {
@@ -152,13 +157,25 @@ void Player::keep_state() {
   now.state->feel = built_->state->feel;
   now.bytes = bytes_of(*now.state);
   kept_.push_back(std::move(now));
+  while (t_s() - time_of(kept_.front()) > kKept_s) kept_.pop_front();
+  thin_out_kept();
+}
+
+// Drops states until they fit, each time the one whose neighbours are nearest to one another. So the minute
+// stays covered, and the oldest and the newest state stay.
+void Player::thin_out_kept() {
   const auto bytes = [this] {
-    std::size_t sum = 0;
-    for (const KeptState& kept : kept_) sum += kept.bytes;
-    return sum;
+    return std::accumulate(kept_.begin(), kept_.end(), std::size_t{0},
+                           [](std::size_t sum, const KeptState& kept) { return sum + kept.bytes; });
   };
-  while (kept_.size() > 1 && (t_s() - time_of(kept_.front()) > kKept_s || bytes() > kMostKeptBytes))
-    kept_.pop_front();
+  while (kept_.size() > 2 && bytes() > kMostKeptBytes) {
+    std::size_t least = 1;
+    const auto gap = [this](std::size_t n) { return kept_[n + 1].ticks - kept_[n - 1].ticks; };
+    for (std::size_t n = 2; n + 1 < kept_.size(); ++n) {
+      if (gap(n) < gap(least)) least = n;
+    }
+    kept_.erase(kept_.begin() + static_cast<std::ptrdiff_t>(least));
+  }
 }
 
 void Player::go_back(std::size_t n) {

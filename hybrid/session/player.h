@@ -77,8 +77,8 @@ class Player {
   // Ticks whose figures may wait for a frame: eight seconds at 1 kHz.
   static constexpr std::size_t kSamples = 8192;
 
-  // States of the session that are kept to go back to: of the last minute, one a second at most, within this
-  // memory. The oldest are dropped first.
+  // States of the session that are kept to go back to: of the last minute, one a second, or as many as fit
+  // into this memory.
   static constexpr double kKept_s = 60.0, kKeepEvery_s = 1.0;
   static constexpr std::size_t kMostKeptBytes = std::size_t{512} << 20;
   // Changes of the scene in a whole session.
@@ -108,7 +108,7 @@ class Player {
   void go_back(std::size_t n);
   // Kept states, the oldest first. Only the thread that keeps them may call these four.
   [[nodiscard]] const std::deque<KeptState>& kept() const noexcept { return kept_; }
-  // Has a second of the session passed since a state was kept? Never with a real device.
+  // Is a state due? Never with a real device.
   [[nodiscard]] bool keeps_at(double t_s) const noexcept;
   [[nodiscard]] double time_of(const KeptState& kept) const noexcept {
     return dt_s_ * static_cast<double>(kept.ticks);
@@ -161,6 +161,7 @@ class Player {
   [[nodiscard]] bool tick_is_due(const PlayRequest& request) noexcept;
   void steer(const PlayRequest& request) noexcept;
   void keep(device::DeviceFault fault) noexcept;
+  void thin_out_kept();
   void fill_figures(Snapshot& out, const WorldState& state, const TickResult& felt,
                     std::uint64_t ticks) const;
 
