@@ -115,13 +115,22 @@ class PastView {
     }
     return nearest;
   }
-  // The picture of that state.
+  // The picture of that state. It is filled again only if the state or the points are other ones.
   const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked) {
-    player.snapshot_of(player.kept()[n], snapshot_, asked);
+    const KeptState& kept = player.kept()[n];
+    const std::uint64_t number = asked != nullptr ? asked->number : 0;
+    if (state_ != kept.state.get() || snapshot_.asked.number != number) {
+      player.snapshot_of(kept, snapshot_, asked);
+      snapshot_.presses = player.presses_of(*kept.state);
+      state_ = kept.state.get();
+    }
     return snapshot_;
   }
+  // Call when the kept states are other ones.
+  void forget() { state_ = nullptr; }
 
  private:
+  const WorldState* state_ = nullptr;  // of snapshot_
   Snapshot snapshot_;
 };
 
@@ -166,6 +175,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
       leave_the_past(window);
     }
     const bool shows_past = back && !input.go_on;
+    if (!shows_past) past.forget();  // kept states come and go
     request.paused = request.paused || shows_past;
     for (ahead_s += kScriptFrame_s; ahead_s > 0.5 / player.rate_hz(); ahead_s -= 1.0 / player.rate_hz()) {
       if (drag) {
@@ -324,6 +334,7 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
       request.asked = nullptr;
     }
     const bool shows_past = back && !input.go_on;
+    if (!shows_past) past.forget();  // kept states come and go
     request.paused = request.paused || shows_past;
     session.ask(request);
     if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);

@@ -300,8 +300,8 @@ void Player::snapshot(Snapshot& out, const AskedPoints* asked) const {
   }
 }
 
-std::vector<PairPress> Player::presses() const {
-  return pair_presses(*built_->world, *built_->state);
+std::vector<PairPress> Player::presses_of(const WorldState& state) const {
+  return pair_presses(*built_->world, state);
 }
 
 Recording Player::recording(const std::string& scene_text) const {

@@ -147,7 +147,8 @@ class Player {
   // is longer than kMostRecorded_s. `scene_text`: text of the scene with which the session began.
   [[nodiscard]] Recording recording(const std::string& scene_text) const;
   // The forces between objects now. Call only while held, or without a servo loop.
-  [[nodiscard]] std::vector<PairPress> presses() const;
+  [[nodiscard]] std::vector<PairPress> presses() const { return presses_of(*built_->state); }
+  [[nodiscard]] std::vector<PairPress> presses_of(const WorldState& state) const;
 
   [[nodiscard]] double t_s() const noexcept { return static_cast<double>(ticks_) * dt_s_; }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }

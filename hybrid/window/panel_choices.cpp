@@ -120,8 +120,11 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
     const TickTimes after = frame.history.times(mark->t_s, ever);
     rows.push_back({"largest force, 5 s", force_text(mark->most_before_N),
                     force_text(frame.history.most_N(ForceSeries::total, mark->t_s, ever))});
-    rows.push_back({"tick, median", time_words(mark->before.p50_us), time_words(after.p50_us)});
-    rows.push_back({"tick, 99 %", time_words(mark->before.p99_us), time_words(after.p99_us)});
+    const auto of = [](const TickTimes& times, double us) {
+      return times.ticks > 0 ? time_words(us) : std::string("no tick");
+    };
+    rows.push_back({"tick, median", of(mark->before, mark->before.p50_us), of(after, after.p50_us)});
+    rows.push_back({"tick, 99 %", of(mark->before, mark->before.p99_us), of(after, after.p99_us)});
   }
   rows.push_back({"voxels", grouped(effect.voxels_before), grouped(effect.voxels_after)});
   write_rows(pen, "effect", rows);
