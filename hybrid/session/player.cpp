@@ -11,9 +11,9 @@
 
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/feel/just_noticeable.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/pair_presses.h"
 #include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/tick/copy_state.h"
 #include "hybrid/tick/take_over.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
@@ -36,16 +36,10 @@ TickSample sample_of(const TickResult& felt, double t_s, double late_s, double d
           .late = late_s >= dt_s};
 }
 
-// The force on the hand at the present place with all tissue at rest (N), and the voxels of all soft objects.
-struct ForcesHere {
-  std::optional<glm::dvec3> force_N;
+std::size_t voxels_of(const WorldState& state) {
   std::size_t voxels = 0;
-};
-ForcesHere forces_here(const World& world, const WorldState& state) {
-  constexpr double tolerance_N = 1e-3;  // far below the least force that a hand tells
-  ForcesHere here{.force_N = equilibrium_force(world, state, tolerance_N)};
-  for (const auto& object : state.soft) here.voxels += object->lattice().voxel_count();
-  return here;
+  for (const auto& object : state.soft) voxels += object->lattice().voxel_count();
+  return voxels;
 }
 
 // Memory of a state (bytes) without the lattices, which all states of a scene share.
@@ -114,10 +108,11 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
     throw std::runtime_error(why_not + ", so the scene cannot change while it is felt; change its file");
   if (changes_.size() == kMostChanges) throw std::runtime_error("the session has changed too often");
   take_edits();  // those that wait belong to the old scene
-  const ForcesHere before = forces_here(*built_->world, *built_->state);
-  if (!take_over(*built_->world, *built_->state, *built.world, *built.state))
+  const RestForce before = force_at_rest(*built_->world, *built_->state);
+  const std::size_t voxels_before = voxels_of(*built_->state);
+  if (!take_over(*built_->world, *built_->state, *built.world, built.state))
     throw std::runtime_error("the changed scene leaves the tool no free place; move the tool away first");
-  const ForcesHere after = forces_here(*built.world, *built.state);
+  const RestForce after = force_at_rest(*built.world, *built.state);
   if (async_) start_async_relaxation(*built.state, arrival_);
   scene_ = &scene;
   built_ = &built;
@@ -126,12 +121,13 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
   kept_.clear();
   ++scenes_;
   edited_ = true;
-  ChangeEffect effect{.t_s = t_s(), .voxels_before = before.voxels, .voxels_after = after.voxels};
-  if (before.force_N) effect.before_N = glm::length(*before.force_N);
-  if (after.force_N) effect.after_N = glm::length(*after.force_N);
-  if (before.force_N && after.force_N)
-    effect.difference_jnd = jnd_of(*after.force_N, *before.force_N, jnd_floor_N(scene));
-  return effect;
+  return {.t_s = t_s(),
+          .before_N = glm::length(before.force_N),
+          .after_N = glm::length(after.force_N),
+          .difference_jnd = jnd_of(after.force_N, before.force_N, jnd_floor_N(scene)),
+          .at_rest = before.steady && after.steady,
+          .voxels_before = voxels_before,
+          .voxels_after = voxels_of(*built_->state)};
 }
 
 // States are kept as often as they will fit, so that few are copied in vain.

@@ -16,7 +16,7 @@
 #include "hybrid/build/choose_model.h"
 #include "hybrid/scene/read_scene_text.h"
 #include "hybrid/scene/toml_tree.h"
-#include "hybrid/session/equilibrium.h"
+#include "hybrid/tick/copy_state.h"
 #include "hybrid/tick/take_over.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/work_budget.h"
@@ -286,7 +286,7 @@ class ReplayedScene {
     }
     BuiltScene next = build(scene_of_text(recording_, change.text));
     if (!why_no_take_over(world(), *next.world).empty() ||
-        !take_over(world(), state(), *next.world, *next.state))
+        !take_over(world(), state(), *next.world, next.state))
       throw std::runtime_error(fmt::format(
           "the scene after tick {} cannot go on from the one before; copy the recording again", change.tick));
     built_ = std::move(next);

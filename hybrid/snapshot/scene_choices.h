@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -50,11 +49,12 @@ struct ObjectChoices {
 };
 
 // Forces on the hand at one place before and after a change, with all tissue at rest, and voxels of all soft
-// objects. Empty: the force did not settle.
+// objects.
 struct ChangeEffect {
   std::string words{};  // the change
   double t_s = 0.0;
-  std::optional<double> before_N{}, after_N{}, difference_jnd{};
+  double before_N = 0.0, after_N = 0.0, difference_jnd = 0.0;
+  bool at_rest = true;  // false: a force had not come to rest, and may be some percent off
   std::size_t voxels_before = 0, voxels_after = 0;
 };
 

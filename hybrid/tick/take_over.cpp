@@ -3,18 +3,23 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <vector>
 
+#include "hybrid/tick/copy_state.h"
 #include "hybrid/tick/tick.h"
+#include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/leave_tissue.h"
 #include "hybrid/world/edits.h"
 
 namespace hybrid {
 namespace {
 
-// The tool is pressed in for kMostTicks at most, and for kSteadyTicks after which the force has changed by
-// less than kSteady_N: a hundredth of what a hand tells.
-constexpr int kMostTicks = 400, kSteadyTicks = 20;
-constexpr double kSteady_N = 5e-4;
+// The tool is pressed in for so many ticks at most; a comparison of forces gets more.
+constexpr int kMostPressing = 400, kMostResting = 1500;
+// The force is steady if it changes by no more than this over kSteadyTicks, which are two relaxations of all
+// tissue.
+constexpr int kSteadyTicks = 100;
+constexpr double kSteadyShare = 0.002, kSteady_N = 2e-4;
 
 template <class Objects>
 std::size_t number_of(const Objects& objects, const std::string& name) {
@@ -40,16 +45,20 @@ void take_edited_values(const World& before_world, const WorldState& before, con
   }
 }
 
-void press_in(const World& world, WorldState& state) {
+// Relaxes all tissue every few ticks. Without that, tissue of unlike stiffness may not come to rest. Returns
+// the force when it is steady.
+RestForce stand_still(const World& world, WorldState& state, int most_ticks) {
+  start_async_relaxation(state, Arrival::at_once);
   const device::DeviceState still{.position_m = state.device_m};
-  glm::dvec3 force(0.0);
-  for (int n = 1; n <= kMostTicks; ++n) {
+  RestForce rest;
+  for (int n = 1; n <= most_ticks && !rest.steady; ++n) {
     const TickResult felt = haptic_tick(world, state, still, 1e-3);
     if (n % kSteadyTicks != 0) continue;
     const glm::dvec3 now = coupling_N_per_m(world, state) * (felt.proxy_m - felt.device_m);
-    if (glm::length(now - force) < kSteady_N) return;
-    force = now;
+    rest.steady = glm::length(now - rest.force_N) <= std::max(kSteady_N, kSteadyShare * glm::length(now));
+    rest.force_N = now;
   }
+  return rest;
 }
 
 }  // namespace
@@ -63,19 +72,29 @@ std::string why_no_take_over(const World& before, const World& after) {
   return {};
 }
 
-bool take_over(const World& before_world, const WorldState& before, const World& world, WorldState& state) {
-  take_edited_values(before_world, before, world, state);
-  if (!start_outside(world, state, before.device_m, before.proxy_m, before.proxy_m - before.device_m))
+bool take_over(const World& before_world, const WorldState& before, const World& world,
+               std::unique_ptr<WorldState>& state) {
+  take_edited_values(before_world, before, world, *state);
+  if (!start_outside(world, *state, before.device_m, before.proxy_m, before.proxy_m - before.device_m))
     return false;
-  press_in(world, state);
-  state.limit = before.limit;
-  state.passive = before.passive;
-  state.clock = before.clock;
-  state.tick = before.tick;
-  state.nonfinite = before.nonfinite;
-  state.faults |= before.faults;
-  state.truncated_ticks = before.truncated_ticks;
+  (void)stand_still(world, *state, kMostPressing);
+  const std::vector<ObjectFeel> feel = state->feel;
+  state = copy_state(world, *state);  // without asynchronous relaxation
+  state->feel = feel;
+  state->limit = before.limit;
+  state->passive = before.passive;
+  state->clock = before.clock;
+  state->tick = before.tick;
+  state->nonfinite = before.nonfinite;
+  state->faults |= before.faults;
+  state->truncated_ticks = before.truncated_ticks;
   return true;
+}
+
+RestForce force_at_rest(const World& world, const WorldState& state) {
+  const std::unique_ptr<WorldState> copy = copy_state(world, state);
+  for (const auto& object : copy->soft) object->widen_patches();
+  return stand_still(world, *copy, kMostResting);
 }
 
 }  // namespace hybrid

@@ -2,6 +2,8 @@
 // A session goes on in another world, between two ticks: the same scene with an object that was changed.
 #pragma once
 
+#include <glm/vec3.hpp>
+#include <memory>
 #include <string>
 
 #include "hybrid/world/world_state.h"
@@ -18,6 +20,14 @@ namespace hybrid {
 // place, until the force is steady. The same arguments give the same state, bit by bit. Allocates. Returns
 // false if there is no free place for the tool; `state` is useless then.
 [[nodiscard]] bool take_over(const World& before_world, const WorldState& before, const World& world,
-                             WorldState& state);
+                             std::unique_ptr<WorldState>& state);
+
+// The force at the device's present place when all tissue is at rest. Rigid objects must not move. Quicker
+// than equilibrium_force(), which is for references.
+struct RestForce {
+  glm::dvec3 force_N{0.0};
+  bool steady = false;  // false: it still changed by more than 0.2 % in a tenth of a second
+};
+[[nodiscard]] RestForce force_at_rest(const World& world, const WorldState& state);
 
 }  // namespace hybrid

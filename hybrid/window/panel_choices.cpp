@@ -37,8 +37,9 @@ std::string time_words(double us) {
   return us < 1000.0 ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
 }
 
-std::string force_words(const std::optional<double>& force_N) {
-  return !force_N ? "not at rest" : *force_N > 0.0 ? force_text(*force_N) : "none";
+std::string force_words(double force_N, bool at_rest) {
+  if (!(force_N > 0.0)) return "none";
+  return (at_rest ? "" : "about ") + force_text(force_N);
 }
 
 // "1 234 567"
@@ -50,13 +51,12 @@ std::string grouped(std::size_t number) {
 
 // The verdict on the force at the place of the change.
 std::string verdict_on(const ChangeEffect& effect) {
-  if (!effect.difference_jnd) return {};
-  if (*effect.before_N == 0.0 && *effect.after_N == 0.0)
+  if (effect.before_N == 0.0 && effect.after_N == 0.0)
     return "The tool touched nothing then. Change it in contact to compare forces.";
-  if (*effect.difference_jnd < kLeastShown_jnd) return "The force is the same.";
-  const std::string jnd = with_digits(*effect.difference_jnd, 2) + " JND";
-  return *effect.difference_jnd < 1.0 ? "The difference is " + jnd + ": no hand tells it."
-                                      : "The difference is " + jnd + ": a hand tells it.";
+  if (effect.difference_jnd < kLeastShown_jnd) return "The force is the same.";
+  const std::string jnd = (effect.at_rest ? "" : "about ") + with_digits(effect.difference_jnd, 2) + " JND";
+  return effect.difference_jnd < 1.0 ? "The difference is " + jnd + ": no hand tells it."
+                                     : "The difference is " + jnd + ": a hand tells it.";
 }
 
 }  // namespace
@@ -114,7 +114,8 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
   write(effect.words);
   std::vector<std::array<std::string, 3>> rows{
       {"", "before", "after"},
-      {"force at that place", force_words(effect.before_N), force_words(effect.after_N)}};
+      {"force at that place", force_words(effect.before_N, effect.at_rest),
+       force_words(effect.after_N, effect.at_rest)}};
   if (const std::optional<ChangeMark>& mark = frame.history.last_change()) {
     constexpr double ever = std::numeric_limits<double>::infinity();
     const TickTimes after = frame.history.times(mark->t_s, ever);
@@ -128,8 +129,7 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
   }
   rows.push_back({"voxels", grouped(effect.voxels_before), grouped(effect.voxels_after)});
   write_rows(pen, "effect", rows);
-  const std::string verdict = verdict_on(effect);
-  if (!verdict.empty()) write(verdict);
+  write(verdict_on(effect));
 }
 
 }  // namespace hybrid
