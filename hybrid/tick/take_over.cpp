@@ -78,9 +78,11 @@ bool take_over(const World& before_world, const WorldState& before, const World&
   if (!start_outside(world, *state, before.device_m, before.proxy_m, before.proxy_m - before.device_m))
     return false;
   (void)stand_still(world, *state, kMostPressing);
-  const std::vector<ObjectFeel> feel = state->feel;
-  state = copy_state(world, *state);  // without asynchronous relaxation
-  state->feel = feel;
+  if (std::ranges::any_of(state->async.objects, [](const auto& object) { return object != nullptr; })) {
+    const std::vector<ObjectFeel> feel = state->feel;
+    state = copy_state(world, *state);  // without asynchronous relaxation
+    state->feel = feel;
+  }
   state->limit = before.limit;
   state->passive = before.passive;
   state->clock = before.clock;
@@ -92,8 +94,8 @@ bool take_over(const World& before_world, const WorldState& before, const World&
 }
 
 RestForce force_at_rest(const World& world, const WorldState& state) {
+  if (state.proxy_m == state.device_m) return {glm::dvec3(0.0), true};  // nothing is touched
   const std::unique_ptr<WorldState> copy = copy_state(world, state);
-  for (const auto& object : copy->soft) object->widen_patches();
   return stand_still(world, *copy, kMostResting);
 }
 

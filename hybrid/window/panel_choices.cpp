@@ -37,9 +37,8 @@ std::string time_words(double us) {
   return us < 1000.0 ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
 }
 
-std::string force_words(double force_N, bool at_rest) {
-  if (!(force_N > 0.0)) return "none";
-  return (at_rest ? "" : "about ") + force_text(force_N);
+std::string force_words(double force_N) {
+  return force_N > 0.0 ? force_text(force_N) : "none";
 }
 
 // "1 234 567"
@@ -114,8 +113,7 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
   write(effect.words);
   std::vector<std::array<std::string, 3>> rows{
       {"", "before", "after"},
-      {"force at that place", force_words(effect.before_N, effect.at_rest),
-       force_words(effect.after_N, effect.at_rest)}};
+      {"force at that place", force_words(effect.before_N), force_words(effect.after_N)}};
   if (const std::optional<ChangeMark>& mark = frame.history.last_change()) {
     constexpr double ever = std::numeric_limits<double>::infinity();
     const TickTimes after = frame.history.times(mark->t_s, ever);
