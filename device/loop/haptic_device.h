@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <memory>
 #include <string_view>
 
 namespace device {
@@ -46,11 +47,14 @@ struct DeviceLimits {
 class HapticDevice {
  public:
   HapticDevice() = default;
-  HapticDevice(const HapticDevice&) = delete;
-  HapticDevice& operator=(const HapticDevice&) = delete;
   HapticDevice(HapticDevice&&) = delete;
   HapticDevice& operator=(HapticDevice&&) = delete;
   virtual ~HapticDevice() = default;
+
+  // A device in the same state, which shares the hand's path; null for a real device. Allocates.
+  [[nodiscard]] virtual std::unique_ptr<HapticDevice> copy() const { return nullptr; }
+  // Takes the state of a device that copy() gave. Returns false for a real device.
+  virtual bool go_back_to(const HapticDevice& /*kept*/) { return false; }
 
   [[nodiscard]] virtual DeviceState read() noexcept = 0;
   // The force on the hand (N, scene frame), held until the next write. A simulated device also advances by
@@ -62,6 +66,10 @@ class HapticDevice {
   virtual void delay(double /*extra_s*/) noexcept {}
   [[nodiscard]] virtual DeviceLimits limits() const noexcept = 0;
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
+
+ protected:
+  HapticDevice(const HapticDevice&) = default;
+  HapticDevice& operator=(const HapticDevice&) = default;
 };
 
 }  // namespace device

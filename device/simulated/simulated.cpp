@@ -61,6 +61,15 @@ class IdealDevice final : public HapticDevice {
  public:
   explicit IdealDevice(std::shared_ptr<const Path> path) : path_(std::move(path)) {}
 
+  [[nodiscard]] std::unique_ptr<HapticDevice> copy() const override {
+    return std::make_unique<IdealDevice>(*this);
+  }
+  bool go_back_to(const HapticDevice& kept) override {
+    const auto* const same = dynamic_cast<const IdealDevice*>(&kept);
+    if (same != nullptr) *this = *same;
+    return same != nullptr;
+  }
+
   DeviceState read() noexcept override {
     constexpr double kHalf_s = 0.1e-3;  // half step of the central difference
     DeviceState state;
@@ -95,6 +104,15 @@ class SimulatedDevice final : public HapticDevice {
         velocity_(options.velocity_span_s) {
     tool_.position_m = target(0.0);
     velocity_.start(encoder_position());
+  }
+
+  [[nodiscard]] std::unique_ptr<HapticDevice> copy() const override {
+    return std::make_unique<SimulatedDevice>(*this);
+  }
+  bool go_back_to(const HapticDevice& kept) override {
+    const auto* const same = dynamic_cast<const SimulatedDevice*>(&kept);
+    if (same != nullptr) *this = *same;
+    return same != nullptr;
   }
 
   DeviceState read() noexcept override {

@@ -1,23 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer: a window and a session, each on a thread of its own. The session publishes snapshots and the
-// figures of every tick, and takes goals and edits. Neither waits for the other.
+// The viewer: a window, and a session on a thread of its own (live_session.h).
 #include <fmt/format.h>
 
-#include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
-#include <thread>
+#include <utility>
 
-#include "device/loop/servo_loop.h"
 #include "device/loop/stop_signal.h"
-#include "hybrid/base/flush_to_zero.h"
-#include "hybrid/base/triple_buffer.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
 #include "hybrid/program/viewed_scene.h"
+#include "hybrid/session/live_session.h"
 #include "hybrid/session/real_device.h"
-#include "hybrid/snapshot/merge_live_surface.h"
 #include "hybrid/window/frame_meter.h"
 #include "hybrid/window/video.h"
 #include "hybrid/window/view_script.h"
@@ -26,7 +22,6 @@
 namespace hybrid {
 namespace {
 
-constexpr double kSnapshotEvery_s = 1.0 / 60.0;  // session time between two pictures of a live view
 constexpr int kScriptFrames_per_s = 30;
 constexpr double kScriptFrame_s = 1.0 / kScriptFrames_per_s;  // session time of one frame of a scripted view
 
@@ -45,12 +40,30 @@ PlayRequest request_of(const WindowInput& input) {
           .goal_m = input.dragged_goal_m.value_or(glm::dvec3(0.0))};
 }
 
-SessionNotes notes_of(const Player& player, double t_s, const std::string& message) {
+SessionNotes notes_of(const Player& player, double t_s, const std::string& message,
+                      const std::optional<ChangeEffect>& effect) {
   return {.real_device = player.is_real(),
           .recorded_s = t_s,
           .refused_edits = player.refused_edits(),
           .unseen_ticks = player.unseen_ticks(),
-          .message = message};
+          .message = message,
+          .effect = effect};
+}
+
+// The changes that the second scene has and the first one lacks.
+std::string changes_between(const ViewedScene& before, const ViewedScene& after) {
+  const auto since = static_cast<std::ptrdiff_t>(before.changes.size());
+  return fmt::format("{}", fmt::join(after.changes.begin() + since, after.changes.end(), ", "));
+}
+
+// Shows the scene in which the session goes on, and drops the one before.
+void show_changed(Window& window, std::unique_ptr<ViewedScene>& viewed, std::unique_ptr<ViewedScene> next,
+                  ChangeEffect& effect) {
+  effect.words = changes_between(*viewed, *next);
+  window.add_ticks(viewed->player->samples());
+  window.show_scene(next->drawn, effect.t_s);
+  next->player = std::move(viewed->player);
+  viewed = std::move(next);
 }
 
 ViewScript read_script(const std::filesystem::path& file, const DrawnScene& drawn) {
@@ -80,14 +93,63 @@ void ask_video(const ViewCommand& command) {
   require_ffmpeg();
 }
 
+// The past states that the window shows, and from which the session goes on.
+class PastView {
+ public:
+  // Fills the notes with the kept states. `now_s`: time of the session.
+  static void add_notes(const Player& player, double now_s, SessionNotes& notes) {
+    for (const KeptState& kept : player.kept()) {
+      notes.kept_s.push_back(now_s - player.time_of(kept));
+      notes.kept_bytes += kept.bytes;
+    }
+  }
+  // The kept state that is shown; empty: the present.
+  static std::optional<std::size_t> shown(const Player& player, double now_s, double back_s) {
+    if (!(back_s > 0.0) || player.kept().empty()) return {};
+    std::size_t nearest = 0;
+    const auto apart = [&](std::size_t n) {
+      return std::abs(now_s - back_s - player.time_of(player.kept()[n]));
+    };
+    for (std::size_t n = 1; n < player.kept().size(); ++n) {
+      if (apart(n) < apart(nearest)) nearest = n;
+    }
+    return nearest;
+  }
+  // The picture of that state. It is filled again only if the state or the points are other ones.
+  const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked) {
+    const KeptState& kept = player.kept()[n];
+    const std::uint64_t number = asked != nullptr ? asked->number : 0;
+    if (state_ != kept.state.get() || snapshot_.asked.number != number) {
+      player.snapshot_of(kept, snapshot_, asked);
+      snapshot_.presses = player.presses_of(*kept.state);
+      state_ = kept.state.get();
+    }
+    return snapshot_;
+  }
+  // Call when the kept states are other ones.
+  void forget() { state_ = nullptr; }
+
+ private:
+  const WorldState* state_ = nullptr;  // of snapshot_
+  Snapshot snapshot_;
+};
+
+void leave_the_past(Window& window) {
+  window.act({.verb = ViewVerb::look_back, .numbers = {0.0}});
+}
+
 // Plays frames that each cover a fixed time, so that the pictures are the same on any machine. Returns the
 // exit status.
-int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window, ViewScript& script) {
+int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
+                ViewScript& script) {
   std::shared_ptr<const device::Path> drag;
   if (!command.drag.empty()) drag = device::make_path(device::CsvPath{.file = command.drag});
-  Player& player = *viewed.player;
+  Player& player = *viewed->player;
   Snapshot snapshot;
   ViewFiles files(command);
+  SceneChanger changer(command);
+  std::optional<ChangeEffect> effect;
+  PastView past;
   FrameMeter meter;
   std::optional<VideoFile> video;
   double ahead_s = 0.0;  // simulated time that the frames are ahead of the ticks
@@ -97,6 +159,24 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
     const WindowInput input = window.take_input();
     PlayRequest request = request_of(input);
     for (const Edit& edit : input.edits) player.edit(edit);
+    for (const SceneChange& change : input.changes) changer.ask(change);
+    try {
+      if (auto next = changer.wait(*viewed)) {
+        effect = player.change_scene(next->scene, next->built, next->drawn, next->text);
+        request.asked = nullptr;  // the points belong to the scene before
+        show_changed(window, viewed, std::move(next), *effect);
+      }
+    } catch (const std::exception& e) {
+      files.say(std::string("The scene is as it was: ") + e.what());
+    }
+    const auto back = PastView::shown(player, player.t_s(), input.back_s);
+    if (back && input.go_on) {
+      player.go_back(*back);
+      leave_the_past(window);
+    }
+    const bool shows_past = back && !input.go_on;
+    if (!shows_past) past.forget();  // kept states come and go
+    request.paused = request.paused || shows_past;
     for (ahead_s += kScriptFrame_s; ahead_s > 0.5 / player.rate_hz(); ahead_s -= 1.0 / player.rate_hz()) {
       if (drag) {
         request.dragging = true;
@@ -104,15 +184,20 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
       }
       player.step(request);
     }
-    player.snapshot(snapshot, input.asked.get());
-    snapshot.presses = input.wants_presses ? player.presses() : std::vector<PairPress>();
+    player.keep_state();
+    player.snapshot(snapshot, request.asked.get());
+    snapshot.presses = input.wants_presses && !shows_past ? player.presses() : std::vector<PairPress>();
+    SessionNotes notes = notes_of(player, snapshot.t_s, files.message(), effect);
+    PastView::add_notes(player, snapshot.t_s, notes);
+    const Snapshot& seen =
+        shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(snapshot);
     meter.end_session();
     window.add_ticks(player.samples());
-    if (!window.frame(snapshot, notes_of(player, snapshot.t_s, files.message()))) break;
+    if (!window.frame(seen, notes)) break;
     meter.end();
     if (!command.out.empty()) save_frame(window, frame_file(command.out, n));
     add_to_video(command, window, video);
-    files.save_what_was_asked(window, input, viewed, snapshot, [] { return true; });
+    files.save_what_was_asked(window, input, *viewed, snapshot, [] { return true; });
     if (const int signal = device::stop_signal(); signal != 0) {
       keep_video(command, video);
       fmt::print(stderr, "stopped by {} after {} of {} frames{}{}\n", signal_in_words(signal), n + 1,
@@ -123,96 +208,8 @@ int play_frames(const ViewCommand& command, ViewedScene& viewed, Window& window,
   if (!command.out.empty()) fmt::print("{} frames in {}\n", *command.frames, command.out.string());
   keep_video(command, video);
   fmt::print("{}\n", meter.in_words());
-  return files.save_at_end(viewed) ? 0 : 1;
+  return files.save_at_end(*viewed) ? 0 : 1;
 }
-
-// The session on its own thread, while a window shows it.
-class LiveSession {
- public:
-  LiveSession(ViewedScene& viewed, BlackBox& box)
-      : player_(*viewed.player), relaxation_(player_.go_live(1.0 / kSnapshotEvery_s)), box_(box) {
-    player_.snapshot(snapshots_.back());
-    snapshots_.publish();
-    thread_ = std::jthread([this] { serve(); });
-  }
-  LiveSession(const LiveSession&) = delete;
-  LiveSession& operator=(const LiveSession&) = delete;
-  LiveSession(LiveSession&&) = delete;
-  LiveSession& operator=(LiveSession&&) = delete;
-  ~LiveSession() { stop(); }
-
-  void ask(const PlayRequest& request) {
-    asked_ = request.asked;
-    requests_.back() = request;
-    requests_.publish();
-  }
-  void shown(const DrawnScene& drawn, Snapshot& snapshot) {
-    relaxation_->ask(asked_);
-    merge_live_surface(drawn, snapshots_.take(), relaxation_->tissue(), asked_.get(), snapshot);
-  }
-  // Waits until the servo thread leaves the state alone. Returns false if it does not answer.
-  bool hold(PlayRequest request) {
-    request.hold = ++holds_;
-    ask(request);
-    for (int n = 0; n < kMostWaits && !ended_; ++n) {
-      if (player_.held() == request.hold) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    return ended_;
-  }
-  [[nodiscard]] bool ended() const { return ended_; }
-  device::ServoReport stop() {
-    stop_ = true;
-    if (thread_.joinable()) thread_.join();
-    return report_;
-  }
-
- private:
-  static constexpr int kMostWaits = 500;  // waits of 1 ms each
-
-  device::ServoAnswer answer(const device::ServoInput& input) {
-    const ScopedFlushToZero flushed;
-    const bool go_on = !stop_.load(std::memory_order_relaxed);
-    if (!go_on) return {.go_on = false, .skip = true};
-    const bool ticked = player_.advance(requests_.take(), input);
-    if (ticked) box_.add(black_box_row(input, player_.felt(), player_.ticks() - 1, player_.state()));
-    if (ticked || player_.edited()) publish(ticked);
-    return {.force_N = player_.felt().force_N, .skip = !ticked};
-  }
-  // Publishes a snapshot, at most 60 times a second of real time.
-  void publish(bool ticked) {
-    const auto now = std::chrono::steady_clock::now();
-    if (ticked && now < next_) return;
-    next_ = now + std::chrono::microseconds(static_cast<int>(1e6 * kSnapshotEvery_s));
-    player_.shown();
-    player_.snapshot(snapshots_.back(), requests_.take().asked.get());
-    snapshots_.publish();
-  }
-  void serve() {
-    auto tick = [this](const device::ServoInput& input) { return answer(input); };
-    try {
-      report_ = device::run_servo(
-          player_.device(),
-          {.rate_hz = player_.rate_hz(), .realtime = true, .deadline_s = player_.deadline_s()}, tick);
-    } catch (const std::exception& e) {
-      report_.end = device::ServoEnd::lost;
-      report_.messages.emplace_back(e.what());
-    }
-    ended_ = true;
-  }
-
-  Player& player_;
-  std::unique_ptr<RelaxationThread> relaxation_;
-  BlackBox& box_;
-  TripleBuffer<Snapshot> snapshots_;
-  TripleBuffer<PlayRequest> requests_;
-  std::shared_ptr<const AskedPoints> asked_;  // of the last request
-  std::atomic<bool> stop_{false}, ended_{false};
-  std::chrono::steady_clock::time_point next_{};
-  std::uint32_t holds_ = 0;
-  device::ServoReport report_;
-  std::jthread thread_;
-};
 
 // Keeps the forces between objects for the window's list. To compute them the session is held for a moment:
 // a simulated hand does not notice, because held time does not count. A real hand would, so with a real
@@ -251,38 +248,103 @@ struct LiveWindow {
   ViewFiles files;
   ViewScript script;
   SceneReload reload;
+  SceneChanger changer;
+  std::optional<ChangeEffect> effect{};
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 };
 
 SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
-  SessionNotes notes = notes_of(player, t_s, live.files.message());
+  SessionNotes notes = notes_of(player, t_s, live.files.message(), live.effect);
+  notes.building = live.changer.building();
+  if (!notes.building.empty()) notes.message = notes.building + "; the session goes on meanwhile";
   if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
+  PastView::add_notes(player, t_s, notes);
   if (!live.reload.error().empty())
     notes.error = live.reload.error() + "\nThe session goes on with the scene as it was.";
   return notes;
 }
 
+// Goes on in a changed scene when it is built. Returns whether it did.
+bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, LiveSession& session,
+                        const PlayRequest& request) {
+  try {
+    auto next = live.changer.poll(*viewed);
+    if (next == nullptr) return false;
+    session.change(request, [&] {
+      live.effect = viewed->player->change_scene(next->scene, next->built, next->drawn, next->text);
+    });
+    show_changed(live.window, viewed, std::move(next), *live.effect);
+    return true;
+  } catch (const std::exception& e) {
+    live.files.say(std::string("The scene is as it was: ") + e.what());
+    return false;
+  }
+}
+
+void go_back(LiveWindow& live, LiveSession& session, const PlayRequest& request, Player& player,
+             std::size_t kept) {
+  try {
+    session.change(request, [&] { player.go_back(kept); });
+    leave_the_past(live.window);
+  } catch (const std::exception& e) {
+    live.files.say(std::string("The session goes on as it was: ") + e.what());
+  }
+}
+
+// Keeps the session's state when it is time. The session stands still for at most one part in 20 of the time.
+void keep_state(LiveSession& session, const PlayRequest& request, const Player& player, double now_s,
+                std::chrono::steady_clock::time_point& next) {
+  constexpr int rest = 19;
+  const auto begin = std::chrono::steady_clock::now();
+  if (begin < next || request.paused || !player.keeps_at(now_s)) return;
+  session.keep_state(request);
+  const auto end = std::chrono::steady_clock::now();
+  next = end + rest * (end - begin);
+}
+
 // Runs the window on this thread and the session on another. Ends when the window closes, or when a changed
 // scene is ready in `next`. Returns the device's events.
-device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& box,
+device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, BlackBox& box,
                               std::unique_ptr<ViewedScene>& next) {
-  LiveSession session(viewed, box);
-  Player& player = *viewed.player;
+  LiveSession session(*viewed->player, box);
+  Player& player = *viewed->player;
   Snapshot shown;
   PressWatch watch;
+  PastView past;
+  auto keep_next = std::chrono::steady_clock::now();
   bool open = true;
   while (open && !session.ended() && next == nullptr) {
     live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
                      live.window);
     const WindowInput input = live.window.take_input();
-    const PlayRequest request = request_of(input);
+    PlayRequest request = request_of(input);
     for (const Edit& edit : input.edits) player.edit(edit);
+    if (player.is_real() && !input.changes.empty())
+      live.files.say("The scene is as it was: with a real device it does not change while it is felt.");
+    for (const SceneChange& change : input.changes) {
+      if (!player.is_real()) live.changer.ask(change);
+    }
+    if (take_changed_scene(live, viewed, session, request)) {
+      request.asked = nullptr;
+      watch = {};
+    }
+    const auto back = PastView::shown(player, shown.t_s, input.back_s);
+    if (back && input.go_on) {
+      go_back(live, session, request, player, *back);
+      request.asked = nullptr;
+    }
+    const bool shows_past = back && !input.go_on;
+    if (!shows_past) past.forget();  // kept states come and go
+    request.paused = request.paused || shows_past;
     session.ask(request);
-    session.shown(viewed.drawn, shown);
+    if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
+    session.shown(viewed->drawn, shown);
     shown.presses = watch.presses(input, request, player, session, shown.tick);
     live.window.add_ticks(player.samples());
-    open = live.window.frame(shown, notes_of(live, player, shown.t_s));
-    live.files.save_what_was_asked(live.window, input, viewed, shown, [&] { return session.hold(request); });
+    open = live.window.frame(
+        shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),
+        notes_of(live, player, shown.t_s));
+    live.files.save_what_was_asked(live.window, input, *viewed, shown, [&] { return session.hold(request); });
     if (input.reload) live.reload.ask();
     if (!player.is_real()) next = live.reload.poll();
   }
@@ -293,11 +355,13 @@ device::ServoReport play_live(LiveWindow& live, ViewedScene& viewed, BlackBox& b
 device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> viewed, BlackBox& box) {
   for (;;) {
     std::unique_ptr<ViewedScene> next;
-    device::ServoReport report = play_live(live, *viewed, box, next);
+    device::ServoReport report = play_live(live, viewed, box, next);
     if (next == nullptr) {
       if (!live.files.save_at_end(*viewed)) report.messages.emplace_back("the session was not recorded");
       return report;
     }
+    live.changer.cancel();
+    live.effect.reset();
     live.window.show_scene(next->drawn);
     viewed = std::move(next);
     print_notes(viewed->built);
@@ -335,10 +399,15 @@ int view(const ViewCommand& command) {
   viewed->player = std::make_unique<Player>(scene, viewed->built, viewed->drawn, real.get());
   if (command.frames) {
     viewed->player->relax_at_once();
-    return play_frames(command, *viewed, window, script);
+    return play_frames(command, std::move(viewed), window, script);
   }
   const auto kept = open_black_box_file({}, command.scene, true, scene.rate_hz);
-  LiveWindow live{command, window, ViewFiles(command), std::move(script), SceneReload(command, viewed->text)};
+  LiveWindow live{command,
+                  window,
+                  ViewFiles(command),
+                  std::move(script),
+                  SceneReload(command, viewed->text),
+                  SceneChanger(command)};
   const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());

@@ -69,14 +69,14 @@ void ViewFiles::save_what_was_asked(Window& window, const WindowInput& input, co
   if (input.recording) {
     attempt("Recording", *input.recording, ".rec", [&](const auto& file) {
       if (!hold()) throw std::runtime_error("the session does not answer; try again");
-      save_recording(file, viewed.player->recording(viewed.text));
+      save_recording(file, viewed.player->recording(viewed.began_with));
     });
   }
   if (input.save_scene) save_scene(viewed, snapshot);
 }
 
-// Writes edited values into the scene's file. The window then loads the changed scene again, so that
-// recordings begin with the new text.
+// Writes changes and edited values into the scene's file. The window then loads the changed scene again, so
+// that recordings begin with the new text.
 void ViewFiles::save_scene(const ViewedScene& viewed, const Snapshot& snapshot) try {
   std::vector<ValueInScene> values;
   for (std::size_t n = 0; n < viewed.drawn.editable.size() && n < snapshot.values.size(); ++n) {
@@ -85,14 +85,15 @@ void ViewFiles::save_scene(const ViewedScene& viewed, const Snapshot& snapshot) 
         value.object == Edit::kTool ? std::string() : viewed.drawn.objects[value.object].name;
     values.push_back({object, value.quantity, snapshot.values[n], value.in_scene});
   }
-  const EditedText edited = write_values(viewed.text, command_.scene, viewed.scene.unit_m, values);
+  EditedText edited = write_values(viewed.text, command_.scene, viewed.scene.unit_m, values);
+  edited.changed.insert(edited.changed.begin(), viewed.changes.begin(), viewed.changes.end());
   std::string words = edited.changed.empty()
                           ? "Nothing of the scene's file has been edited."
                           : fmt::format("{} written; the session begins anew. Changed: {}.",
                                         command_.scene.string(), fmt::join(edited.changed, ", "));
   if (!edited.left.empty()) words += fmt::format(" Not in the file: {}.", fmt::join(edited.left, ", "));
   if (!edited.changed.empty()) {
-    if (text_of(command_.scene) != viewed.text)
+    if (text_of(command_.scene) != viewed.file_text)
       throw std::runtime_error("its file has changed since it was loaded; wait until it is loaded again");
     save_text(command_.scene, edited.text);
   }
@@ -105,7 +106,7 @@ bool ViewFiles::save_at_end(const ViewedScene& viewed) const {
   if (command_.record.empty()) return true;
   Outputs outputs;
   outputs.write("recording", command_.record,
-                [&](const auto& file) { save_recording(file, viewed.player->recording(viewed.text)); });
+                [&](const auto& file) { save_recording(file, viewed.player->recording(viewed.began_with)); });
   outputs.say_files();
   return !outputs.failed();
 }

@@ -6,8 +6,12 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "hybrid/base/flush_to_zero.h"
+#include "hybrid/build/choose_model.h"
+#include "hybrid/scene/read_scene_text.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
+#include "hybrid/tune/scene_choices.h"
 
 namespace hybrid {
 namespace {
@@ -43,7 +47,7 @@ std::string text_of(const std::filesystem::path& file) {
 std::unique_ptr<ViewedScene> read_viewed_scene(const ViewCommand& command) {
   auto viewed = std::make_unique<ViewedScene>();
   viewed->scene = load_scene(command.scene);  // comes first: its error messages are more precise
-  viewed->text = text_of(command.scene);
+  viewed->text = viewed->file_text = viewed->began_with = text_of(command.scene);
   if (!command.device.empty()) use_device(viewed->scene, command.device);
   return viewed;
 }
@@ -55,6 +59,64 @@ void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const P
   viewed.drawn =
       drawn_scene(scene, viewed.built, scene.title.empty() ? command.scene.stem().string() : scene.title);
   if (!scene.real_device) viewed.drawn.path_m = places_along(*scene_path(scene));
+  Scene as_read = read_scene_text(viewed.text, command.scene);
+  as_read.real_device = scene.real_device;  // the command may have chosen another one
+  add_choices(as_read, viewed.drawn);
+}
+
+void SceneChanger::start(const ViewedScene& played) {
+  built_ = asked_.size();
+  // All changes since the played scene, whose text stays while this one is built.
+  next_ = std::async(std::launch::async, [this, &played, changes = asked_] {
+    const ScopedFlushToZero flushed;  // as a replay does, so that it builds the same bits
+    auto viewed = std::make_unique<ViewedScene>();
+    viewed->text = changed_text(played.text, command_.scene, changes);
+    viewed->file_text = played.file_text;
+    viewed->began_with = played.began_with;
+    viewed->changes = played.changes;
+    for (const SceneChange& change : changes) viewed->changes.push_back(in_words(change));
+    viewed->scene = read_scene_text(viewed->text, command_.scene);
+    choose_models(viewed->scene);
+    if (!command_.device.empty()) use_device(viewed->scene, command_.device);
+    build_viewed_scene(command_, *viewed, [this](const std::string& step) {
+      const std::scoped_lock lock(guard_);
+      step_ = step;
+    });
+    return viewed;
+  });
+}
+
+std::unique_ptr<ViewedScene> SceneChanger::poll(const ViewedScene& played) {
+  if (!next_.valid()) {
+    if (!asked_.empty()) start(played);
+    return nullptr;
+  }
+  if (next_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return nullptr;
+  if (built_ < asked_.size()) {  // more was asked for meanwhile
+    start(played);
+    return nullptr;
+  }
+  asked_.clear();
+  return next_.get();
+}
+
+std::unique_ptr<ViewedScene> SceneChanger::wait(const ViewedScene& played) {
+  if (asked_.empty()) return nullptr;
+  start(played);
+  asked_.clear();
+  return next_.get();
+}
+
+std::string SceneChanger::building() const {
+  if (!next_.valid()) return {};
+  const std::scoped_lock lock(guard_);
+  return step_.empty() ? "reading the changed scene" : step_;
+}
+
+void SceneChanger::cancel() {
+  asked_.clear();
+  if (next_.valid()) next_.wait();
+  next_ = {};
 }
 
 // Looks first at the time of the last change, because that is cheap. If an editor is still writing, the time

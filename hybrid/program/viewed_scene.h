@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene with all that is needed to show and play it in a window. SceneReload loads the scene again while
-// the old one is played.
+// A scene with all that is needed to show and play it in a window. While it is played, SceneReload loads the
+// scene's file again, and SceneChanger builds a scene that the window's user changed.
 #pragma once
 
 #include <chrono>
 #include <filesystem>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <vector>
 
 #include "hybrid/program/commands.h"
 #include "hybrid/session/player.h"
@@ -15,7 +17,10 @@
 namespace hybrid {
 
 struct ViewedScene {
-  std::string text;  // of the scene's file when it was loaded
+  std::string text;                    // of this scene
+  std::string file_text;               // of the scene's file when it was loaded
+  std::string began_with;              // of the scene with which the session began
+  std::vector<std::string> changes{};  // those since it was loaded, in words
   Scene scene;
   BuiltScene built;
   DrawnScene drawn;
@@ -31,6 +36,39 @@ struct ViewedScene {
 [[nodiscard]] std::unique_ptr<ViewedScene> read_viewed_scene(const ViewCommand& command);
 // Builds the scene that was read. Throws SceneError.
 void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const Progress& progress);
+
+// Builds scenes that differ from the one that is played, on a thread of its own.
+class SceneChanger {
+ public:
+  explicit SceneChanger(const ViewCommand& command) : command_(command) {}
+  SceneChanger(const SceneChanger&) = delete;
+  SceneChanger& operator=(const SceneChanger&) = delete;
+  SceneChanger(SceneChanger&&) = delete;
+  SceneChanger& operator=(SceneChanger&&) = delete;
+  ~SceneChanger() { cancel(); }
+
+  // Changes that are asked for while a scene is built are made together.
+  void ask(const SceneChange& change) { asked_.push_back(change); }
+  // Call once a frame. Returns the changed scene, without a player, when it is built, otherwise null. Throws
+  // std::exception, once, if the scene cannot be changed that way.
+  [[nodiscard]] std::unique_ptr<ViewedScene> poll(const ViewedScene& played);
+  // Waits for the scene; null if no change was asked for.
+  [[nodiscard]] std::unique_ptr<ViewedScene> wait(const ViewedScene& played);
+  // The step of building, in words; empty: nothing is built.
+  [[nodiscard]] std::string building() const;
+  // Forgets the changes that were asked for. Waits until nothing is built.
+  void cancel();
+
+ private:
+  void start(const ViewedScene& played);
+
+  const ViewCommand& command_;
+  std::vector<SceneChange> asked_;
+  std::size_t built_ = 0;  // those of asked_ that the scene in `next_` has
+  mutable std::mutex guard_;
+  std::string step_;  // of building; guard_ protects it
+  std::future<std::unique_ptr<ViewedScene>> next_;
+};
 
 // Loads the scene again when its file has changed, on a thread of its own. The old session goes on meanwhile,
 // and also after an error.

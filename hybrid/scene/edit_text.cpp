@@ -81,9 +81,8 @@ const TreeNode* item_named(const TreeNode& root, const TextTable& table) {
 
 // Null: there is no such table.
 const TreeNode* find_table(const TreeNode& root, const TextTable& table) {
-  if (table.name.empty()) return table_within(root, table.key);
-  const TreeNode* const item = item_named(root, table);
-  return item == nullptr || table.part.empty() ? item : table_within(*item, table.part);
+  const TreeNode* const whole = table.name.empty() ? table_within(root, table.key) : item_named(root, table);
+  return whole == nullptr || table.part.empty() ? whole : table_within(*whole, table.part);
 }
 
 bool same(const TreeNode& a, const TreeNode& b) {
@@ -101,7 +100,7 @@ bool same(const TreeNode& a, const TreeNode& b) {
 }
 
 // Takes the key out of the table and returns its value. A table that so becomes empty is taken out, too, if
-// it has no name.
+// set() may have added it.
 TreeNode take(TreeNode& root, const TextTable& table, std::string_view key) {
   TreeNode value;
   if (const TreeNode* const found = find_table(root, table)) {
@@ -111,7 +110,7 @@ TreeNode take(TreeNode& root, const TextTable& table, std::string_view key) {
       value = std::move(entry->value);
       entries.erase(entry);
     }
-    if (entries.empty() && table.name.empty())
+    if (entries.empty() && table.name.empty() && table.part.empty())
       std::erase_if(root.entries, [&](const TreeEntry& e) { return e.key == table.key; });
   }
   return value;
@@ -171,7 +170,8 @@ std::string SceneTextEditor::added(const TreeNode& table, std::string_view key,
 std::string SceneTextEditor::set(const TextTable& table, std::string_view key, const std::string& value) {
   const TreeNode root = parse_tree(text_, file_);
   const TreeNode* const found = find_table(root, table);
-  if (found == nullptr && !table.name.empty()) return "its table is not in the scene's text";
+  if (found == nullptr && !(table.name.empty() && table.part.empty()))
+    return "its table is not in the scene's text";
   std::string changed;
   if (found == nullptr) {
     const std::string line_break = break_of(text_, 0);

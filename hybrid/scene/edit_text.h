@@ -12,11 +12,11 @@
 namespace hybrid {
 
 // A table of a scene: {"tool"}, the item of a list by its key `name` as {"rigid", "plate"}, or a table within
-// that item as {"rigid", "plate", "texture"}.
+// one of these as {"rigid", "plate", "texture"} and {"material", "", "fat"}.
 struct TextTable {
   std::string key;
   std::string name{};  // empty: `key` is a table, not a list
-  std::string part{};  // empty: the item itself
+  std::string part{};  // empty: the table or item itself
 };
 
 // It parses the text again after each change. A change is kept only if the text then reads as before, but for

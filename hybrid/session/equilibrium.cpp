@@ -5,7 +5,6 @@
 #include <glm/geometric.hpp>
 
 #include "device/loop/stop_signal.h"
-#include "hybrid/tick/bodies/body_collisions.h"
 #include "hybrid/tick/tick.h"
 
 namespace hybrid {
@@ -13,20 +12,6 @@ namespace {
 
 constexpr int kSettleTicks = 1200;  // the most ticks that equilibrium_force() runs
 constexpr int kStillTicks = 40;     // ticks over which the force must stay within the tolerance
-
-}  // namespace
-
-std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state) {
-  auto copy = std::make_unique<WorldState>(world, OccupancyMap(state.map));
-  for (const auto& object : state.soft) copy->soft.push_back(object->copy());
-  copy->prepare(world);
-  prepare_collisions(world, *copy);
-  copy->map.reserve_bricks(1024);
-  static_cast<CarriedState&>(*copy) = static_cast<const CarriedState&>(state);
-  return copy;
-}
-
-namespace {
 
 // Do the anchors carry the felt force of each object that only the tool presses? Standing still does not
 // prove equilibrium. In a deep push with active limits all around, nothing may move from one cycle to the

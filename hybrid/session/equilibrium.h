@@ -3,15 +3,11 @@
 #pragma once
 
 #include <glm/vec3.hpp>
-#include <memory>
 #include <optional>
 
-#include "hybrid/world/world_state.h"
+#include "hybrid/tick/copy_state.h"
 
 namespace hybrid {
-
-// A deep copy of the state; the constant lattices are shared.
-std::unique_ptr<WorldState> copy_state(const World& world, const WorldState& state);
 
 // The force at the present device position once all tissue is at rest (N). A copy of the state is relaxed
 // until two things hold: the force changes by less than `tolerance_N` over dozens of whole relaxation cycles,

@@ -6,11 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <stdexcept>
 
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/feel/just_noticeable.h"
 #include "hybrid/session/pair_presses.h"
 #include "hybrid/snapshot/fill_snapshot.h"
+#include "hybrid/tick/copy_state.h"
+#include "hybrid/tick/take_over.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
 namespace hybrid {
@@ -32,27 +36,42 @@ TickSample sample_of(const TickResult& felt, double t_s, double late_s, double d
           .late = late_s >= dt_s};
 }
 
+std::size_t voxels_of(const WorldState& state) {
+  std::size_t voxels = 0;
+  for (const auto& object : state.soft) voxels += object->lattice().voxel_count();
+  return voxels;
+}
+
+// Memory of a state (bytes) without the lattices, which all states of a scene share.
+std::size_t bytes_of(const WorldState& state) {
+  std::size_t bytes = sizeof state + state.map.memory_bytes();
+  for (const auto& object : state.soft) bytes += object->memory_bytes() - object->lattice().memory_bytes();
+  for (const auto& queries : state.obstacle_queries) bytes += queries.capacity() * sizeof queries.front();
+  return bytes;
+}
+
 }  // namespace
 
 glm::dvec3 SteeredPath::position(double t_s) const noexcept {
-  return dragged_ ? goal_m_ : path_->position(std::fmod(t_s - start_s_, path_->duration_s() + 1.0));
+  return now_.dragged ? now_.goal_m
+                      : path_->position(std::fmod(t_s - now_.start_s, path_->duration_s() + 1.0));
 }
 
 void SteeredPath::drag_to(const glm::dvec3& goal_m) noexcept {
-  dragged_ = true;
-  goal_m_ = goal_m;
+  now_.dragged = true;
+  now_.goal_m = goal_m;
 }
 
 void SteeredPath::restart(double now_s) noexcept {
-  dragged_ = false;
-  start_s_ = now_s;
+  now_.dragged = false;
+  now_.start_s = now_s;
 }
 
 Player::Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
                device::HapticDevice* real_device)
-    : scene_(scene),
-      built_(built),
-      drawn_(drawn),
+    : scene_(&scene),
+      built_(&built),
+      drawn_(&drawn),
       path_(std::make_shared<SteeredPath>(scene_path(scene))),
       simulated_(real_device == nullptr ? scene_device(scene, path_) : nullptr),
       device_(real_device == nullptr ? *simulated_ : *real_device),
@@ -68,20 +87,129 @@ Player::Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
 
 std::unique_ptr<RelaxationThread> Player::go_live(double surfaces_hz) {
   live_ = async_ = true;
-  start_async_relaxation(*built_.state, Arrival::thread);
-  return std::make_unique<RelaxationThread>(*built_.world, built_.state->async, surfaces_hz);
+  arrival_ = Arrival::thread;
+  start_async_relaxation(*built_->state, arrival_);
+  return relaxation_thread(surfaces_hz);
+}
+
+std::unique_ptr<RelaxationThread> Player::relaxation_thread(double surfaces_hz) {
+  return std::make_unique<RelaxationThread>(*built_->world, built_->state->async, surfaces_hz);
 }
 
 void Player::relax_at_once() {
   async_ = true;
-  start_async_relaxation(*built_.state, Arrival::counted);
+  start_async_relaxation(*built_->state, arrival_);
+}
+
+ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
+                                  const std::string& text) {
+  const std::string why_not = why_no_take_over(*built_->world, *built.world);
+  if (!why_not.empty())
+    throw std::runtime_error(why_not + ", so the scene cannot change while it is felt; change its file");
+  if (changes_.size() == kMostChanges) throw std::runtime_error("the session has changed too often");
+  take_edits();  // those that wait belong to the old scene
+  const RestForce before = force_at_rest(*built_->world, *built_->state);
+  const std::size_t voxels_before = voxels_of(*built_->state);
+  if (!take_over(*built_->world, *built_->state, *built.world, built.state))
+    throw std::runtime_error("the changed scene leaves the tool no free place; move the tool away first");
+  const RestForce after = force_at_rest(*built.world, *built.state);
+  if (async_) start_async_relaxation(*built.state, arrival_);
+  scene_ = &scene;
+  built_ = &built;
+  drawn_ = &drawn;
+  changes_.push_back({.tick = ticks_, .edits_before = applied_.size(), .text = text});
+  kept_.clear();
+  ++scenes_;
+  edited_ = true;
+  return {.t_s = t_s(),
+          .before_N = glm::length(before.force_N),
+          .after_N = glm::length(after.force_N),
+          .difference_jnd = jnd_of(after.force_N, before.force_N, jnd_floor_N(scene)),
+          .at_rest = before.steady && after.steady,
+          .voxels_before = voxels_before,
+          .voxels_after = voxels_of(*built_->state)};
+}
+
+// States are kept as often as they will fit, so that few are copied in vain.
+bool Player::keeps_at(double t_s) const noexcept {
+  if (is_real()) return false;
+  if (kept_.empty()) return true;
+  const double share = static_cast<double>(kept_.back().bytes) / static_cast<double>(kMostKeptBytes);
+  return t_s - time_of(kept_.back()) >= std::max(kKeepEvery_s, share * kKept_s);
+}
+
+void Player::keep_state() {
+  if (!keeps_at(t_s())) return;
+  take_edits();
+  KeptState now{.ticks = ticks_,
+                .hash = hash_,
+                .edits = applied_.size(),
+                .changes = changes_.size(),
+                .state = copy_state(*built_->world, *built_->state),
+                .device = device_.copy(),
+                .steering = path_->steering(),
+                .goal_m = goal_m_,
+                .felt = felt_};
+  now.state->feel = built_->state->feel;
+  now.bytes = bytes_of(*now.state);
+  kept_.push_back(std::move(now));
+  while (t_s() - time_of(kept_.front()) > kKept_s) kept_.pop_front();
+  thin_out_kept();
+}
+
+// Drops states until they fit, each time the one whose neighbours are nearest to one another. So the minute
+// stays covered, and the oldest and the newest state stay.
+void Player::thin_out_kept() {
+  const auto bytes = [this] {
+    return std::accumulate(kept_.begin(), kept_.end(), std::size_t{0},
+                           [](std::size_t sum, const KeptState& kept) { return sum + kept.bytes; });
+  };
+  while (kept_.size() > 2 && bytes() > kMostKeptBytes) {
+    std::size_t least = 1;
+    const auto gap = [this](std::size_t n) { return kept_[n + 1].ticks - kept_[n - 1].ticks; };
+    for (std::size_t n = 2; n + 1 < kept_.size(); ++n) {
+      if (gap(n) < gap(least)) least = n;
+    }
+    kept_.erase(kept_.begin() + static_cast<std::ptrdiff_t>(least));
+  }
+}
+
+void Player::go_back(std::size_t n) {
+  if (n >= kept_.size()) throw std::runtime_error("that state is no longer kept");
+  if (changes_.size() >= kMostChanges) throw std::runtime_error("the session has changed too often");
+  take_edits();  // those that wait are forgotten with the rest
+  kept_.erase(kept_.begin() + static_cast<std::ptrdiff_t>(n) + 1, kept_.end());
+  const KeptState& kept = kept_.back();
+  built_->state = copy_state(*built_->world, *kept.state);
+  built_->state->feel = kept.state->feel;
+  if (async_) start_async_relaxation(*built_->state, arrival_);
+  (void)device_.go_back_to(*kept.device);
+  path_->steer_as(kept.steering);
+  goal_m_ = kept.goal_m;
+  felt_ = kept.felt;
+  ticks_ = kept.ticks;
+  hash_ = kept.hash;
+  due_ = 0.0;
+  whole_ = whole_ || recorded_.size() >= kept.ticks;
+  recorded_.resize(std::min<std::size_t>(recorded_.size(), kept.ticks));
+  applied_.resize(kept.edits);
+  changes_.resize(kept.changes);
+  changes_.push_back({.tick = ticks_, .edits_before = applied_.size(), .text = {}});
+  edited_ = true;
+}
+
+void Player::snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked) const {
+  fill_figures(out, *kept.state, kept.felt, kept.ticks);
+  fill_moved(*built_->world, *kept.state, out);
+  out.asked.number = 0;
+  if (asked != nullptr) fill_asked(*built_->world, *kept.state, *asked, false, out);
 }
 
 void Player::take_edits() noexcept {
   Edit edit;
   while (applied_.size() < kMostEdits && edits_.pop(edit)) {
     edit.tick = ticks_;
-    if (apply_edit(*built_.world, *built_.state, edit)) applied_.push_back(edit);
+    if (apply_edit(*built_->world, *built_->state, edit)) applied_.push_back(edit);
     edited_ = true;
   }
 }
@@ -119,7 +247,7 @@ void Player::keep(device::DeviceFault fault) noexcept {
     whole_ = false;
     return;
   }
-  recorded_.push_back({felt_.device_m, hash_, fault, built_.state->async.arrived, 0});
+  recorded_.push_back({felt_.device_m, hash_, fault, built_->state->async.arrived, 0});
 }
 
 bool Player::advance(const PlayRequest& request, const device::ServoInput& input) noexcept {
@@ -128,7 +256,7 @@ bool Player::advance(const PlayRequest& request, const device::ServoInput& input
   take_edits();
   if (!tick_is_due(request)) return false;
   steer(request);
-  felt_ = haptic_tick(*built_.world, *built_.state, input.device, dt_s_);
+  felt_ = haptic_tick(*built_->world, *built_->state, input.device, dt_s_);
   if (!request.dragging) goal_m_ = felt_.device_m;
   keep(input.device.fault);
   samples_.push(sample_of(felt_, t_s(), input.late_s, dt_s_));
@@ -140,25 +268,36 @@ void Player::step(const PlayRequest& request) {
   if (advance(request, {.device = device_.read(), .dt_s = dt_s_})) device_.write(felt_.force_N, dt_s_);
 }
 
-void Player::snapshot(Snapshot& out, const AskedPoints* asked) const {
-  out.tick = built_.state->tick;
-  out.t_s = t_s();
-  out.device_m = felt_.device_m;
-  out.proxy_m = felt_.proxy_m;
-  out.force_N = felt_.force_N;
-  out.feel = built_.state->feel;
-  out.tick_us = felt_.tick_us;
-  fill_values(*built_.world, *built_.state, drawn_, out);
-  if (live_) {
-    fill_moved_near(*built_.world, *built_.state, out);
-  } else {
-    fill_moved(*built_.world, *built_.state, out);
-  }
-  if (asked != nullptr) fill_asked(*built_.world, *built_.state, *asked, live_, out);
+void Player::fill_figures(Snapshot& out, const WorldState& state, const TickResult& felt,
+                          std::uint64_t ticks) const {
+  if (out.scene != scene_number()) out = Snapshot();
+  out.scene = scene_number();
+  out.tick = state.tick;
+  out.t_s = dt_s_ * static_cast<double>(ticks);
+  out.device_m = felt.device_m;
+  out.proxy_m = felt.proxy_m;
+  out.force_N = felt.force_N;
+  out.feel = state.feel;
+  out.tick_us = felt.tick_us;
+  fill_values(*built_->world, state, *drawn_, out);
 }
 
-std::vector<PairPress> Player::presses() const {
-  return pair_presses(*built_.world, *built_.state);
+void Player::snapshot(Snapshot& out, const AskedPoints* asked) const {
+  fill_figures(out, *built_->state, felt_, ticks_);
+  if (live_) {
+    fill_moved_near(*built_->world, *built_->state, out);
+  } else {
+    fill_moved(*built_->world, *built_->state, out);
+  }
+  if (asked != nullptr) {
+    fill_asked(*built_->world, *built_->state, *asked, live_, out);
+  } else {
+    out.asked.number = 0;
+  }
+}
+
+std::vector<PairPress> Player::presses_of(const WorldState& state) const {
+  return pair_presses(*built_->world, state);
 }
 
 Recording Player::recording(const std::string& scene_text) const {
@@ -168,15 +307,16 @@ Recording Player::recording(const std::string& scene_text) const {
                     "restart the window and record a shorter one",
                     kMostRecorded_s / 60.0));
   }
-  return {.scene_file = std::filesystem::absolute(scene_.file),
+  return {.scene_file = std::filesystem::absolute(scene_->file),
           .scene_text = scene_text,
           .dt_s = dt_s_,
-          .device = scene_limits(scene_),
+          .device = scene_limits(*scene_),
           .async_relaxation = async_,
-          .state_hash = hash_state(hash_, *built_.state),
+          .state_hash = hash_state(hash_, *built_->state),
           .start_m = start_m_,
           .ticks = recorded_,
-          .edits = applied_};
+          .edits = applied_,
+          .changes = changes_};
 }
 
 }  // namespace hybrid

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -42,11 +43,29 @@ class SteeredPath final : public device::Path {
   void drag_to(const glm::dvec3& goal_m) noexcept;
   void restart(double now_s) noexcept;
 
+  struct Steering {
+    bool dragged = false;
+    glm::dvec3 goal_m{0.0};
+    double start_s = 0.0;  // of the path
+  };
+  [[nodiscard]] const Steering& steering() const noexcept { return now_; }
+  void steer_as(const Steering& steering) noexcept { now_ = steering; }
+
  private:
   std::shared_ptr<const device::Path> path_;
-  bool dragged_ = false;
-  glm::dvec3 goal_m_{0.0};
-  double start_s_ = 0.0;
+  Steering now_;
+};
+
+// The session at an earlier tick.
+struct KeptState {
+  std::uint64_t ticks = 0, hash = 0;
+  std::size_t edits = 0, changes = 0;  // until then
+  std::unique_ptr<WorldState> state;
+  std::unique_ptr<device::HapticDevice> device;
+  SteeredPath::Steering steering;
+  glm::dvec3 goal_m{0.0};
+  TickResult felt;
+  std::size_t bytes = 0;  // memory that it takes
 };
 
 class Player {
@@ -58,6 +77,13 @@ class Player {
   // Ticks whose figures may wait for a frame: eight seconds at 1 kHz.
   static constexpr std::size_t kSamples = 8192;
 
+  // States of the session that are kept to go back to: of the last minute, one a second, or as many as fit
+  // into this memory.
+  static constexpr double kKept_s = 60.0, kKeepEvery_s = 1.0;
+  static constexpr std::size_t kMostKeptBytes = std::size_t{512} << 20;
+  // Changes of the scene in a whole session.
+  static constexpr std::size_t kMostChanges = 10'000;
+
   // Starts the proxy, or throws SceneError. `real_device`: null for the scene's simulated device. Keeps
   // references to all arguments.
   Player(const Scene& scene, BuiltScene& built, const DrawnScene& drawn, device::HapticDevice* real_device);
@@ -67,14 +93,41 @@ class Player {
   [[nodiscard]] std::unique_ptr<RelaxationThread> go_live(double surfaces_hz);
   void relax_at_once();
 
+  // The session goes on in another scene, which was made from `text` and built beside (take_over.h). Call it
+  // only while held, or without a servo loop, and without a relaxation thread of the old scene. Keeps
+  // references to the arguments; those of the old scene are no longer used. Throws std::runtime_error if that
+  // is not possible; the session then goes on as it was. `words` of the result are left to the caller.
+  ChangeEffect change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
+                            const std::string& text);
+  // ---- going back; call these as change_scene() ----
+  // Keeps the present state, if a second of the session has passed since the last one was kept. Nothing is
+  // kept with a real device. States of an earlier scene are dropped.
+  void keep_state();
+  [[nodiscard]] bool keeps_now() const noexcept;
+  // The session goes on from kept state number `n`; what came after it is forgotten, by the recording too.
+  void go_back(std::size_t n);
+  // Kept states, the oldest first. Only the thread that keeps them may call these four.
+  [[nodiscard]] const std::deque<KeptState>& kept() const noexcept { return kept_; }
+  // Is a state due? Never with a real device.
+  [[nodiscard]] bool keeps_at(double t_s) const noexcept;
+  [[nodiscard]] double time_of(const KeptState& kept) const noexcept {
+    return dt_s_ * static_cast<double>(kept.ticks);
+  }
+  void snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked = nullptr) const;
+
+  // The thread that relaxes the tissue of the present scene, for a session that went live.
+  [[nodiscard]] std::unique_ptr<RelaxationThread> relaxation_thread(double surfaces_hz);
+  // Number of scenes before the present one.
+  [[nodiscard]] std::uint32_t scene_number() const noexcept { return scenes_; }
+
   // ---- the servo thread; neither allocates, locks or throws ----
   // Takes edits, and does one tick if one is due. Returns true if there was a tick.
   bool advance(const PlayRequest& request, const device::ServoInput& input) noexcept;
   [[nodiscard]] const TickResult& felt() const noexcept { return felt_; }
   // Fills the snapshot of this moment, from within the servo loop. `asked`: as of PlayRequest.
   void snapshot(Snapshot& out, const AskedPoints* asked = nullptr) const;
-  // Were edits taken since the last snapshot?
-  [[nodiscard]] bool edited() const noexcept { return edited_; }
+  // Were edits taken, or the scene changed, since the last snapshot? False while held.
+  [[nodiscard]] bool edited() const noexcept { return edited_ && held() == 0; }
   void shown() noexcept { edited_ = false; }
 
   // ---- without a servo loop: one period on the calling thread ----
@@ -91,39 +144,47 @@ class Player {
   // PlayRequest::hold as the servo thread saw it last. While it is not 0 that thread leaves the state alone.
   [[nodiscard]] std::uint32_t held() const noexcept { return held_.load(std::memory_order_acquire); }
   // The session so far. Call only while held, or after the session. Throws std::runtime_error if the session
-  // is longer than kMostRecorded_s.
+  // is longer than kMostRecorded_s. `scene_text`: text of the scene with which the session began.
   [[nodiscard]] Recording recording(const std::string& scene_text) const;
   // The forces between objects now. Call only while held, or without a servo loop.
-  [[nodiscard]] std::vector<PairPress> presses() const;
+  [[nodiscard]] std::vector<PairPress> presses() const { return presses_of(*built_->state); }
+  [[nodiscard]] std::vector<PairPress> presses_of(const WorldState& state) const;
 
   [[nodiscard]] double t_s() const noexcept { return static_cast<double>(ticks_) * dt_s_; }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }
   [[nodiscard]] double rate_hz() const noexcept { return rate_hz_; }
-  [[nodiscard]] double deadline_s() const noexcept { return built_.world->limits.deadline_s; }
+  [[nodiscard]] double deadline_s() const noexcept { return built_->world->limits.deadline_s; }
   [[nodiscard]] device::HapticDevice& device() noexcept { return device_; }
-  [[nodiscard]] const WorldState& state() const noexcept { return *built_.state; }
+  [[nodiscard]] const WorldState& state() const noexcept { return *built_->state; }
 
  private:
   void take_edits() noexcept;
   [[nodiscard]] bool tick_is_due(const PlayRequest& request) noexcept;
   void steer(const PlayRequest& request) noexcept;
   void keep(device::DeviceFault fault) noexcept;
+  void thin_out_kept();
+  void fill_figures(Snapshot& out, const WorldState& state, const TickResult& felt,
+                    std::uint64_t ticks) const;
 
-  const Scene& scene_;
-  BuiltScene& built_;
-  const DrawnScene& drawn_;
+  const Scene* scene_;
+  BuiltScene* built_;
+  const DrawnScene* drawn_;
   std::shared_ptr<SteeredPath> path_;
   std::unique_ptr<device::HapticDevice> simulated_;
   device::HapticDevice& device_;
   double rate_hz_, dt_s_;
   glm::dvec3 start_m_{0.0}, goal_m_{0.0};
   bool live_ = false, async_ = false, edited_ = false, whole_ = true;
+  Arrival arrival_ = Arrival::counted;
   std::uint64_t ticks_ = 0, hash_ = kHashBegin;
   std::uint32_t restarts_ = 0, single_ticks_ = 0;
   double due_ = 0.0;  // ticks that are due, in slow motion: a fraction below 1
   TickResult felt_;
   std::vector<RecordedTick> recorded_;
   std::vector<Edit> applied_;
+  std::vector<RecordedChange> changes_;
+  std::deque<KeptState> kept_;
+  std::uint32_t scenes_ = 0;
   SpscRing<Edit> edits_{kEditsWaiting};
   TickSamples samples_{kSamples};
   std::atomic<std::uint32_t> held_{0};

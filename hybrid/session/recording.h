@@ -12,6 +12,14 @@
 
 namespace hybrid {
 
+// Before this tick the session goes on in another scene (take_over.h), or from a copy of its own state, to
+// which it went back.
+struct RecordedChange {
+  std::uint64_t tick = 0;
+  std::uint64_t edits_before = 0;  // number of edits that were applied in the scenes before
+  std::string text;                // of the scene from then on; empty: the same scene, in a copy of its state
+};
+
 struct Recording {
   std::filesystem::path scene_file;  // the scene's file at the time of recording; replay reads it again
   // Text of that file at the time of recording, so that a change is noticed.
@@ -22,7 +30,8 @@ struct Recording {
   std::uint64_t state_hash = 0;   // after the last tick
   glm::dvec3 start_m{0.0};        // SessionResult::start_m
   std::vector<RecordedTick> ticks;
-  std::vector<Edit> edits{};  // in order of their ticks
+  std::vector<Edit> edits{};              // in order of their ticks
+  std::vector<RecordedChange> changes{};  // in order of their ticks
 };
 
 // save_recording() throws std::runtime_error if the file cannot be written, load_recording() if it is no

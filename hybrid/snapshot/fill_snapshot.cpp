@@ -152,7 +152,8 @@ void fill_moved_near(const World& world, const WorldState& state, Snapshot& snap
 }
 
 Snapshot take_snapshot(const World& world, const WorldState& state, const TickResult& tick, double t_s) {
-  Snapshot snapshot{.tick = state.tick,
+  Snapshot snapshot{.scene = 0,
+                    .tick = state.tick,
                     .t_s = t_s,
                     .device_m = tick.device_m,
                     .proxy_m = tick.proxy_m,

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/snapshot/scene_choices.h"
 #include "hybrid/world/edits.h"
 #include "hybrid/world/object_feel.h"
 #include "polygon/mesh/mesh.h"
@@ -61,6 +62,7 @@ struct DrawnObject {
   std::vector<std::uint8_t> vertex_material{};
   DrawnInside inside{};
   std::optional<DrawnScan> scan{};
+  ObjectChoices choices{};
 
   // Does the surface hide a material?
   [[nodiscard]] bool hides_material() const {
@@ -145,6 +147,7 @@ struct PairPress {
 };
 
 struct Snapshot {
+  std::uint32_t scene = 0;  // number of changes of the scene before it; DrawnScene must be of the same scene
   std::uint64_t tick = 0;
   double t_s = 0.0;
   glm::dvec3 device_m{0.0}, proxy_m{0.0}, force_N{0.0};  // scene frame

@@ -9,7 +9,6 @@
 #include <set>
 
 #include "hybrid/base/number_text.h"
-#include "hybrid/build/build_objects.h"
 #include "hybrid/build/choose_model.h"
 #include "hybrid/compare/compare.h"
 
@@ -44,13 +43,8 @@ bool yields(const Scene& scene, const SoftDescription& soft) {
 }
 
 // The voxels' spacing in a file before resampling, in the scene's unit.
-glm::dvec3 file_spacing(const Scene& scene, const SoftDescription& soft) {
-  SoftDescription plain = soft;
-  auto& volume = std::get<VolumeSource>(plain.source);
-  volume.spacing_m.reset();
-  volume.largest = false;
-  std::vector<BuildNote> notes;
-  return rounded(build_volume(plain, notes).spacing_m / scene.unit_m);
+glm::dvec3 file_spacing(const Scene& scene, const VolumeSource& volume) {
+  return rounded(voxel::read_volume_header(volume.file, volume.unit_m).spacing_m / scene.unit_m);
 }
 
 void set_spacing_m(SoftSource& source, const glm::dvec3& spacing_m) {
@@ -65,7 +59,7 @@ void set_spacing_m(SoftSource& source, const glm::dvec3& spacing_m) {
 
 void find_spacing(const Scene& scene, const SoftDescription& soft, TunableObject& object) {
   if (const auto* volume = std::get_if<VolumeSource>(&soft.source)) {
-    object.finest = file_spacing(scene, soft);
+    object.finest = file_spacing(scene, *volume);
     if (volume->spacing_m) object.own.spacing = rounded(*volume->spacing_m / scene.unit_m);
   } else if (const auto* mesh = std::get_if<ClosedMeshSource>(&soft.source)) {
     object.own.spacing = rounded(mesh->spacing_m / scene.unit_m);

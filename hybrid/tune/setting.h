@@ -52,7 +52,7 @@ struct TunableObject {
 };
 
 // The soft objects of a scene from read_scene(), with models as written. Objects for which the scene asks for
-// the proxy are left out. Opens volumes whose spacing the scene does not give. Throws SceneError,
+// the proxy are left out. Reads the headers of volumes. Throws SceneError,
 // std::exception.
 std::vector<TunableObject> tunable_objects(const Scene& as_read);
 

@@ -10,6 +10,7 @@
 #include "hybrid/view/legend.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
+#include "hybrid/window/controls.h"
 #include "hybrid/window/panel_words.h"
 
 namespace hybrid {
@@ -110,14 +111,92 @@ PixelRect take_place(float height) {
   return {static_cast<int>(at.x), static_cast<int>(at.y), static_cast<int>(width), static_cast<int>(height)};
 }
 
+}  // namespace
+
+namespace controls {
+
 void label_beside(const Pen& pen, const std::string& words) {
-  ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted(words.c_str());
+  label(words);
   ImGui::SameLine(9.2F * pen.em);
   ImGui::SetNextItemWidth(-0.1F * pen.em);
 }
+void label(const std::string& words) {
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted(words.c_str());
+}
+void same_line() {
+  ImGui::SameLine();
+}
+void begin_fixed(bool fixed) {
+  ImGui::BeginDisabled(fixed);
+}
+void end_fixed() {
+  ImGui::EndDisabled();
+}
+bool button(const char* id, float width) {
+  return ImGui::Button(id, {width, 0.0F});
+}
+bool tick_box(const char* id, bool& on) {
+  return ImGui::Checkbox(id, &on);
+}
+bool radio(const char* id, bool on) {
+  return ImGui::RadioButton(id, on);
+}
 
-}  // namespace
+std::optional<std::size_t> choose(const char* id, const std::string& shown,
+                                  std::span<const std::string> choices) {
+  std::optional<std::size_t> taken;
+  if (!ImGui::BeginCombo(id, shown.c_str())) return taken;
+  for (std::size_t n = 0; n < choices.size(); ++n) {
+    if (ImGui::Selectable(choices[n].c_str(), choices[n] == shown)) taken = n;
+  }
+  ImGui::EndCombo();
+  return taken;
+}
+
+Slid slide(const char* id, float& value, float low, float high, const std::string& format, bool logarithmic) {
+  const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+  const bool changed = ImGui::SliderFloat(id, &value, low, high, format.c_str(), flags);
+  return {changed, ImGui::IsItemActive(), ImGui::IsItemDeactivatedAfterEdit()};
+}
+void tip(const std::string& words) {
+  if (ImGui::IsItemHovered() && !ImGui::IsItemActive()) ImGui::SetTooltip("%s", words.c_str());
+}
+
+void write(const std::string& words, bool pale) {
+  ImGui::PushTextWrapPos();
+  if (pale) {
+    ImGui::TextDisabled("%s", words.c_str());
+  } else {
+    ImGui::TextUnformatted(words.c_str());
+  }
+  ImGui::PopTextWrapPos();
+}
+void write_rows(const Pen& pen, const char* id, std::span<const std::array<std::string, 3>> rows) {
+  if (!ImGui::BeginTable(id, 3)) return;
+  ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
+  for (const char* column : {"first", "second"})
+    ImGui::TableSetupColumn(column, ImGuiTableColumnFlags_WidthFixed, pen.width("8 888 888 N"));
+  for (const auto& row : rows) {
+    ImGui::TableNextRow();
+    for (std::size_t n = 0; n < row.size(); ++n) {
+      ImGui::TableNextColumn();
+      const float left = n > 0 ? ImGui::GetContentRegionAvail().x - pen.width(row[n]) : 0.0F;
+      ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(left, 0.0F));
+      ImGui::TextUnformatted(row[n].c_str());
+    }
+  }
+  ImGui::EndTable();
+}
+
+float free_width() {
+  return ImGui::GetContentRegionAvail().x;
+}
+float gap() {
+  return ImGui::GetStyle().ItemSpacing.x;
+}
+
+}  // namespace controls
 
 void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const {
   const ViewState& state = frame.state;
@@ -235,7 +314,7 @@ void Panels::draw_slider(const Pen& pen, std::size_t index, const EditableValue&
                          PanelResult& result) {
   const double unit = si_of_unit(value.quantity);
   const std::string unit_words(unit_of(value.quantity));
-  label_beside(pen, words_of_value(value.quantity));
+  controls::label_beside(pen, words_of_value(value.quantity));
   float shown = moved_ == index ? moved_to_ : static_cast<float>(now / unit);
   const std::string format = number_format(shown) + (unit_words.empty() ? "" : " " + unit_words);
   const int flags = ImGuiSliderFlags_AlwaysClamp | (value.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
@@ -271,12 +350,21 @@ void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot
     any = true;
     edited = edited || snapshot.values[n] != value.in_scene;
   }
-  if (!any) ImGui::TextDisabled("Its values are fixed while it is felt.");
+  const bool tissue = selected < scene.objects.size() && scene.objects[selected].choices.tissue;
+  if (tissue) draw_choices(pen, scene, frame, result);
+  if (!any && !tissue) ImGui::TextDisabled("Its values are fixed while it is felt.");
   if (selected < scene.objects.size()) {
-    label_beside(pen, "opacity");
+    controls::label_beside(pen, "opacity");
     float opacity = 100.0F * frame.state.view.look_of(selected).opacity;
     if (ImGui::SliderFloat("##opacity", &opacity, 0.0F, 100.0F, "%.0f %%", ImGuiSliderFlags_AlwaysClamp))
       result.actions.push_back({.verb = ViewVerb::opacity, .numbers = {0.01 * opacity}, .object = selected});
+  }
+  if (selected < scene.objects.size()) {
+    bool moves = frame.state.moves;
+    ImGui::BeginDisabled(!scene.objects[selected].choices.open);
+    if (ImGui::Checkbox("arrows to move it (O)", &moves))
+      result.actions.push_back({.verb = ViewVerb::arrows, .numbers = {moves ? 1.0 : 0.0}});
+    ImGui::EndDisabled();
   }
   ImGui::BeginDisabled(!edited);
   if (any && ImGui::Button("Values of the scene")) {
@@ -291,88 +379,6 @@ void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot
   ImGui::EndDisabled();
 }
 
-void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
-                       PanelResult& result) {
-  const ViewSettings& view = frame.state.view;
-  const auto ask = [&](ViewVerb verb, std::vector<double> numbers = {}, std::string text = {}) {
-    result.actions.push_back({.verb = verb, .numbers = std::move(numbers), .text = std::move(text)});
-  };
-  static constexpr std::array<const char*, 5> looks{"all", "contact", "x", "y", "z"};
-  static constexpr std::array<const char*, 5> look_words{"all (F)", "contact (C)", "X", "Y", "Z"};
-  const float narrow = 2.2F * pen.em, gap = ImGui::GetStyle().ItemSpacing.x;
-  const float wide = 0.5F * (ImGui::GetContentRegionAvail().x - 3.0F * narrow - 4.0F * gap);
-  for (std::size_t n = 0; n < looks.size(); ++n) {
-    if (n > 0) ImGui::SameLine();
-    if (ImGui::Button(look_words[n], {n < 2 ? wide : narrow, 0.0F})) ask(ViewVerb::look, {}, looks[n]);
-  }
-  if (std::exchange(bounds_of_, &scene) != &scene) {
-    bounds_ = bounds_of(scene);
-    box_ = soft_box(scene);
-  }
-  bool clip = view.clip.on;
-  if (ImGui::Checkbox("clip", &clip)) ask(ViewVerb::clip, {clip ? 1.0 : 0.0});
-  for (int axis = 0; axis < 3; ++axis) {
-    static constexpr std::array<const char*, 3> names{"x", "y", "z"};
-    ImGui::SameLine();
-    if (ImGui::RadioButton(names[static_cast<std::size_t>(axis)], view.clip.axis == axis))
-      ask(ViewVerb::clip_axis, {static_cast<double>(axis)});
-  }
-  ImGui::SameLine();
-  bool other = view.clip.other_side;
-  if (ImGui::Checkbox("other side", &other)) ask(ViewVerb::clip_side);
-  if (clip) {
-    auto share = static_cast<float>(view.clip.share);
-    const std::string place = length_text(clip_place_m(view.clip, bounds_));
-    label_beside(pen, "at");
-    if (ImGui::SliderFloat("##clip", &share, 0.0F, 1.0F, place.c_str(), ImGuiSliderFlags_AlwaysClamp))
-      ask(ViewVerb::clip_place, {static_cast<double>(share)});
-  }
-  if (!box_.empty) draw_tissue_view(pen, view, result);
-  bool inset = view.inset, dark = view.dark;
-  if (ImGui::Checkbox("near view", &inset)) ask(ViewVerb::inset, {inset ? 1.0 : 0.0});
-  ImGui::SameLine();
-  if (ImGui::Checkbox("dark", &dark)) ask(ViewVerb::dark, {dark ? 1.0 : 0.0});
-}
-
-void Panels::draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const {
-  const auto ask = [&](ViewVerb verb, std::vector<double> numbers) {
-    result.actions.push_back({.verb = verb, .numbers = std::move(numbers)});
-  };
-  ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted("slices");
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    static constexpr std::array<const char*, 3> names{"x##slice", "y##slice", "z##slice"};
-    ImGui::SameLine();
-    bool on = view.slices[axis].on;
-    if (ImGui::Checkbox(names[axis], &on))
-      ask(ViewVerb::slice, {static_cast<double>(axis), on ? view.slices[axis].share : -1.0});
-  }
-  ImGui::SameLine();
-  bool grey = view.grey;
-  if (ImGui::Checkbox("grey values", &grey)) ask(ViewVerb::slice_grey, {grey ? 1.0 : 0.0});
-  if (ImGui::IsItemHovered())
-    ImGui::SetTooltip("Slices show the scan that the tissue was made from, where the scene names one");
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!view.slices[axis].on) continue;
-    static constexpr std::array<const char*, 3> names{"slice x", "slice y", "slice z"};
-    auto share = static_cast<float>(view.slices[axis].share);
-    label_beside(pen, names[axis]);
-    const std::string place = length_text(box_.place_m(axis, view.slices[axis].share));
-    ImGui::PushID(names[axis]);
-    if (ImGui::SliderFloat("##place", &share, 0.0F, 1.0F, place.c_str(), ImGuiSliderFlags_AlwaysClamp))
-      ask(ViewVerb::slice, {static_cast<double>(axis), static_cast<double>(share)});
-    ImGui::PopID();
-  }
-  label_beside(pen, "tissue shows");
-  if (ImGui::BeginCombo("##colour", kTissueColours[static_cast<std::size_t>(view.colour)].data())) {
-    for (std::size_t n = 0; n < kTissueColours.size(); ++n) {
-      if (ImGui::Selectable(kTissueColours[n].data(), static_cast<std::size_t>(view.colour) == n))
-        ask(ViewVerb::colour, {static_cast<double>(n)});
-    }
-    ImGui::EndCombo();
-  }
-}
-
 void Panels::take_input() {
   ImGuiIO& io = ImGui::GetIO();
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
@@ -385,6 +391,11 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   PanelResult& result = result_;
   set_style(pen, frame.state.view.dark);
   ImGui::PushFont(pen.body);
+  if (frame.handles != nullptr) {
+    Pen behind = pen;
+    behind.list = ImGui::GetBackgroundDrawList();
+    draw_move_handles(behind, *frame.handles, frame.camera, frame.scene_place);
+  }
   ImGui::SetNextWindowPos({static_cast<float>(where.x), static_cast<float>(where.y)});
   ImGui::SetNextWindowSize({static_cast<float>(where.width), static_cast<float>(where.height)});
   constexpr ImGuiWindowFlags flags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
@@ -392,7 +403,10 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   if (ImGui::Begin(kPanelName, nullptr, flags)) {
     if (frame.input.by_keyboard && !ImGui::IsWindowFocused(ImGuiFocusedFlags_ChildWindows))
       ImGui::SetWindowFocus();
-    if (open_section("Session")) draw_session(frame, snapshot, result);
+    if (open_section("Session")) {
+      draw_session(frame, snapshot, result);
+      draw_past(pen, frame, result);
+    }
     if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
     if (has_soft(scene) && open_section("Forces between objects")) {
       result.wants_presses = true;
@@ -400,6 +414,8 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     }
     const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
     if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
+    if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
+      draw_effect(pen, frame);
     if (open_section("View")) draw_view(pen, scene, frame, result);
     Pen chart = pen;
     chart.list = ImGui::GetWindowDrawList();

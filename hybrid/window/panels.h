@@ -3,6 +3,7 @@
 // tick times. It draws with Dear ImGui and returns actions. It changes nothing itself.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "hybrid/view/layout.h"
 #include "hybrid/view/overlay_panel.h"
 #include "hybrid/view/text_painter.h"
+#include "hybrid/window/move_handles.h"
 #include "hybrid/window/tick_history.h"
 #include "hybrid/window/ui_input.h"
 #include "hybrid/window/view_state.h"
@@ -24,6 +26,11 @@ struct SessionNotes {
   std::uint64_t unseen_ticks = 0;   // ticks missing in the charts because a frame took too long
   std::string message{};            // result of the last action; empty: none
   std::string error{};              // error in the scene's file; empty: none
+  // Kept states, the oldest first: how long ago they were (s), and the memory of all.
+  std::vector<double> kept_s{};
+  std::size_t kept_bytes = 0;
+  std::string building{};                // progress of a changed scene that is built; empty: none
+  std::optional<ChangeEffect> effect{};  // of the last change of the scene
 };
 
 // The data that the panel shows in one frame.
@@ -32,6 +39,9 @@ struct PanelFrame {
   const TickHistory& history;
   const SessionNotes& notes;
   const UiInput& input;
+  const Camera& camera;
+  const PixelRect& scene_place;          // of the scene in the frame
+  const MoveHandles* handles = nullptr;  // null: none are shown
 };
 
 struct PanelResult {
@@ -61,6 +71,12 @@ class Panels final : public OverlayPanel {
                    PanelResult& result);
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
                    PanelResult& result);
+  // ---- panel_choices.cpp ----
+  void draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
+  void draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result);
+  void draw_effect(const Pen& pen, const PanelFrame& frame) const;
+  // ---- panel_view.cpp ----
+  void draw_past(const Pen& pen, const PanelFrame& frame, PanelResult& result) const;
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
   void draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const;
 
@@ -74,7 +90,18 @@ class Panels final : public OverlayPanel {
   // frame later.
   std::size_t moved_ = static_cast<std::size_t>(-1);
   float moved_to_ = 0.0F;
+  // Young's modulus (kPa) that the user gives to a material, until the changed scene is there.
+  struct AskedYoung {
+    std::string material;
+    float young_kPa = 0.0F;
+    int frames_left = 0;  // for which it is shown although nothing is built
+  };
+  std::optional<AskedYoung> asked_young_;
 };
+
+// Draws the arrows by which an object is moved (panel_handles.cpp).
+void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera& camera,
+                       const PixelRect& where);
 
 // ---- charts (panel_charts.cpp) ----
 // Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in

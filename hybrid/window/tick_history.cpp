@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace hybrid {
 namespace {
 
+constexpr double kEver = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMostSamples = 200'000;  // ten seconds at the highest servo rate
 
 float force_of(const TickSample& sample, ForceSeries series) noexcept {
@@ -44,7 +46,7 @@ std::size_t TickTimes::bin_of(double us) noexcept {
 
 void TickHistory::add(const TickSample& sample) {
   if (!std::isfinite(sample.t_s)) return;
-  if (!samples_.empty() && sample.t_s <= samples_.back().t_s) samples_.clear();
+  if (!samples_.empty() && sample.t_s <= samples_.back().t_s) clear();
   samples_.push_back(sample);
   while (samples_.front().t_s <= sample.t_s - seconds_ || samples_.size() > kMostSamples)
     samples_.pop_front();
@@ -71,11 +73,22 @@ std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series,
   return columns;
 }
 
+void TickHistory::mark(double t_s) {
+  // What came before an earlier mark was of yet another scene.
+  const double from_s = mark_ ? mark_->t_s : 0.0;
+  mark_ = ChangeMark{
+      .t_s = t_s, .before = times(from_s, t_s), .most_before_N = most_N(ForceSeries::total, from_s, t_s)};
+}
+
 double TickHistory::most_N(ForceSeries series) const {
+  return most_N(series, 0.0, kEver);
+}
+
+double TickHistory::most_N(ForceSeries series, double from_s, double to_s) const {
   float most = 0.0F;
   for (const TickSample& sample : samples_) {
     const float force = force_of(sample, series);
-    if (std::isfinite(force)) most = std::max(most, force);
+    if (sample.t_s >= from_s && sample.t_s < to_s && std::isfinite(force)) most = std::max(most, force);
   }
   return static_cast<double>(most);
 }
@@ -87,16 +100,21 @@ double TickHistory::most_N() const {
 }
 
 TickTimes TickHistory::times() const {
+  return times(0.0, kEver);
+}
+
+TickTimes TickHistory::times(double from_s, double to_s) const {
   TickTimes times;
   std::vector<float> sorted;
   sorted.reserve(samples_.size());
   for (const TickSample& sample : samples_) {
+    if (sample.t_s < from_s || sample.t_s >= to_s) continue;
     ++times.bins[TickTimes::bin_of(static_cast<double>(sample.tick_us))];
     times.late += sample.late ? 1 : 0;
     sorted.push_back(sample.tick_us);
     for (std::size_t s = 0; s < kStages; ++s) times.stage_us[s] += static_cast<double>(sample.stage_us[s]);
   }
-  times.ticks = samples_.size();
+  times.ticks = sorted.size();
   for (double& mean : times.stage_us) mean /= std::max(1.0, static_cast<double>(times.ticks));
   std::sort(sorted.begin(), sorted.end());
   times.p50_us = percentile_of(sorted, 0.5);

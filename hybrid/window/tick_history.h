@@ -35,13 +35,26 @@ struct TickTimes {
   static std::size_t bin_of(double us) noexcept;
 };
 
+// The time at which the scene changed while it was felt, and the ticks before it that the history had.
+struct ChangeMark {
+  double t_s = 0.0;
+  TickTimes before;
+  double most_before_N = 0.0;  // largest force
+};
+
 class TickHistory {
  public:
   explicit TickHistory(double seconds) : seconds_(seconds) {}
 
   // Adds a tick. A time that is not later than the last one begins a new history.
   void add(const TickSample& sample);
-  void clear() { samples_.clear(); }
+  void clear() {
+    samples_.clear();
+    mark_.reset();
+  }
+  // Marks a change of the scene. It replaces an earlier mark.
+  void mark(double t_s);
+  [[nodiscard]] const std::optional<ChangeMark>& last_change() const { return mark_; }
   [[nodiscard]] bool empty() const { return samples_.empty(); }
   [[nodiscard]] double seconds() const { return seconds_; }
   [[nodiscard]] double end_s() const { return samples_.empty() ? 0.0 : samples_.back().t_s; }
@@ -50,11 +63,15 @@ class TickHistory {
   [[nodiscard]] std::vector<std::optional<ColumnRange>> columns(ForceSeries series, std::size_t count) const;
   [[nodiscard]] double most_N(ForceSeries series) const;  // largest force
   [[nodiscard]] double most_N() const;                    // of all series
+  [[nodiscard]] double most_N(ForceSeries series, double from_s, double to_s) const;
   [[nodiscard]] TickTimes times() const;
+  // Of the ticks from `from_s` on and before `to_s`.
+  [[nodiscard]] TickTimes times(double from_s, double to_s) const;
 
  private:
   double seconds_;
   std::deque<TickSample> samples_;
+  std::optional<ChangeMark> mark_;
 };
 
 }  // namespace hybrid

@@ -22,6 +22,11 @@ enum class ScriptArguments : std::uint8_t {
   object,
   object_number,  // an object, and a number from 0 to 1
   edit,           // an object or "tool", a quantity, and a value in the panel's unit
+  model,          // tissue, and "voxels" or "rigid"
+  energy,         // tissue, and "six-link" or "trilinear"
+  spacing,        // tissue, and millimetres
+  young,          // a material, and pascals
+  move,           // an object, and three numbers: millimetres
   look,           // "all", "contact", "x", "y" or "z"
   clip,           // "off", or an axis and a number
   slice,          // "off", or an axis, and a number or "off"
@@ -37,12 +42,20 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 25> kScriptCommands{
+constexpr std::array<ScriptCommand, 33> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
      {"speed", ViewVerb::speed, ScriptArguments::number, "speed 0.1"},
      {"restart", ViewVerb::restart, ScriptArguments::none, "restart"},
      {"edit", ViewVerb::edit, ScriptArguments::edit, "edit tool stiffness 600"},
+     {"model", ViewVerb::change, ScriptArguments::model, "model brain rigid"},
+     {"energy", ViewVerb::change, ScriptArguments::energy, "energy brain trilinear"},
+     {"spacing", ViewVerb::change, ScriptArguments::spacing, "spacing brain 2.5"},
+     {"young", ViewVerb::change, ScriptArguments::young, "young fat 3000"},
+     {"move", ViewVerb::change, ScriptArguments::move, "move plate 0 0 2"},
+     {"back", ViewVerb::look_back, ScriptArguments::number, "back 5"},
+     {"go-on", ViewVerb::go_on, ScriptArguments::none, "go-on"},
+     {"arrows", ViewVerb::arrows, ScriptArguments::on_or_off, "arrows on"},
      {"select", ViewVerb::select, ScriptArguments::object, "select bone"},
      {"show", ViewVerb::show, ScriptArguments::object, "show bone"},
      {"hide", ViewVerb::show, ScriptArguments::object, "hide bone"},
@@ -160,6 +173,62 @@ class ScriptLine {
            (names.empty() ? "" : "; it has " + names));
   }
 
+  // Only tissue has models.
+  [[nodiscard]] std::string tissue(std::size_t n) const {
+    const DrawnObject& named = scene_.objects[object(n, false)];
+    if (!named.choices.tissue) refuse("'" + named.name + "' is no tissue, so it has one model only");
+    return named.name;
+  }
+  [[nodiscard]] std::string material(std::size_t n) const {
+    std::string names;
+    for (const DrawnObject& drawn : scene_.objects) {
+      for (const MaterialChoice& choice : drawn.choices.materials) {
+        if (choice.name == words_[n]) return choice.name;
+        names += (names.empty() ? "" : ", ") + choice.name;
+      }
+    }
+    refuse("there is no material '" + words_[n] + "'" +
+           (names.empty() ? std::string() : "; the scene has " + names));
+  }
+
+  void read_change(ScriptArguments kind, ViewAction& action) const {
+    using Key = SceneChange::Key;
+    constexpr double least_mm = 1e-3, most_mm = 1e6;   // of a spacing; scenes refuse others
+    constexpr double least_Pa = 1e-3, most_Pa = 1e13;  // as a scene's file
+    SceneChange& change = action.change;
+    const bool moves = kind == ScriptArguments::move;
+    expect(moves ? 4 : 2, moves ? 4 : 2);
+    change.name = moves ? scene_.objects[object(2, false)].name
+                        : (kind == ScriptArguments::young ? material(2) : tissue(2));
+    const auto second = [&](std::string_view first_word, std::string_view second_word) {
+      if (words_[3] != first_word && words_[3] != second_word)
+        refuse("'" + words_[3] + "' is not known there" + example());
+      return words_[3] == second_word ? 1.0 : 0.0;
+    };
+    switch (kind) {
+      case ScriptArguments::model:
+        change.key = Key::model;
+        change.value.x = second("voxels", "rigid");
+        break;
+      case ScriptArguments::energy:
+        change.key = Key::energy;
+        change.value.x = second("six-link", "trilinear");
+        break;
+      case ScriptArguments::spacing:
+        change.key = Key::spacing;
+        change.value.x = 1e-3 * number(3, least_mm, most_mm);
+        break;
+      case ScriptArguments::young:
+        change.key = Key::young;
+        change.value.x = number(3, least_Pa, most_Pa);
+        break;
+      default:
+        change.key = Key::move;
+        for (int d = 0; d < 3; ++d)
+          change.value[d] = 1e-3 * number(3 + static_cast<std::size_t>(d), -most_mm, most_mm);
+    }
+  }
+
   [[nodiscard]] double axis(std::size_t n) const {
     static constexpr std::string_view axes = "xyz";
     const std::size_t axis = words_[n].size() == 1 ? axes.find(words_[n]) : std::string_view::npos;
@@ -215,6 +284,13 @@ class ScriptLine {
       case ScriptArguments::edit:
         read_edit(action);
         break;
+      case ScriptArguments::model:
+      case ScriptArguments::energy:
+      case ScriptArguments::spacing:
+      case ScriptArguments::young:
+      case ScriptArguments::move:
+        read_change(command.arguments, action);
+        break;
       case ScriptArguments::look:
         expect(1, 1);
         choose(2, {"all", "contact", "x", "y", "z"});
@@ -266,6 +342,7 @@ class ScriptLine {
 }  // namespace
 
 ViewScript::ViewScript(const std::string& text, const std::string& file, const DrawnScene& scene) {
+  for (const DrawnObject& object : scene.objects) objects_.push_back(object.name);
   std::size_t at = 0;
   for (std::size_t n = 1; at <= text.size(); ++n) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
@@ -298,7 +375,15 @@ std::vector<ViewAction> ViewScript::due(double t_s) {
 }
 
 void ViewScript::play(double t_s, Window& window) {
-  for (const ViewAction& action : due(t_s)) window.act(action);
+  for (ViewAction& action : due(t_s)) {
+    if (action.object < objects_.size()) {  // its number may be another one by now
+      const auto& objects = window.scene().objects;
+      const auto at = std::ranges::find(objects, objects_[action.object], &DrawnObject::name);
+      if (at == objects.end()) continue;
+      action.object = static_cast<std::uint32_t>(at - objects.begin());
+    }
+    window.act(action);
+  }
 }
 
 }  // namespace hybrid

@@ -34,6 +34,7 @@ class ViewScript {
     double t_s = 0.0;
     ViewAction action;
   };
+  std::vector<std::string> objects_;  // names of the objects of `scene`
   std::vector<Timed> actions_;
   std::size_t next_ = 0;
 };

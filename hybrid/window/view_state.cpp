@@ -93,6 +93,15 @@ void act_on_session(ViewState& state, const ViewAction& action) {
     case ViewVerb::edit:
       state.edits.push_back({0, action.object, action.quantity, number_of(action)});
       break;
+    case ViewVerb::look_back:
+      state.back_s = std::max(number_of(action), 0.0);
+      break;
+    case ViewVerb::go_on:
+      state.go_on = state.back_s > 0.0;
+      break;
+    case ViewVerb::change:
+      state.changes.push_back(action.change);
+      break;
     case ViewVerb::screenshot:
       state.screenshot = action.text;
       break;
@@ -112,6 +121,21 @@ void act_on_session(ViewState& state, const ViewAction& action) {
 
 }  // namespace
 
+void go_to_scene(ViewState& state, const DrawnScene& before, const DrawnScene& after) {
+  std::vector<ObjectLook> looks(after.objects.size());
+  std::uint32_t selected = Edit::kTool;
+  for (std::uint32_t o = 0; o < after.objects.size(); ++o) {
+    const auto same = std::ranges::find(before.objects, after.objects[o].name, &DrawnObject::name);
+    if (same == before.objects.end()) continue;
+    const auto old = static_cast<std::uint32_t>(same - before.objects.begin());
+    looks[o] = state.view.look_of(old);
+    if (state.selected == old) selected = o;
+  }
+  state.view.looks = std::move(looks);
+  state.selected = selected;
+  state.edits.clear();  // they name objects of the old scene
+}
+
 void act(ViewState& state, const ViewAction& action) {
   switch (action.verb) {
     case ViewVerb::select:
@@ -119,6 +143,9 @@ void act(ViewState& state, const ViewAction& action) {
       return;
     case ViewVerb::look:
       state.look = action.text;
+      return;
+    case ViewVerb::arrows:
+      set_or_flip(state.moves, action);
       return;
     case ViewVerb::panels:
       set_or_flip(state.panels, action);

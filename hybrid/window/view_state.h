@@ -19,6 +19,10 @@ enum class ViewVerb : std::uint8_t {
   speed,           // numbers: simulated time over real time
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
+  change,          // change: of the scene, which is built again
+  look_back,       // numbers: seconds before now; 0: the present
+  go_on,           // the session goes on from the past that is shown
+  arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
   select,          // object
   show,            // object, numbers: 1 visible, 0 hidden
   opacity,         // object, numbers: 0 to 1
@@ -50,24 +54,35 @@ struct ViewAction {
   std::string text{};
   std::uint32_t object = Edit::kTool;
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
+  SceneChange change{};
 };
 
 struct ViewState {
   ViewSettings view;
   bool panels = true;
   std::uint32_t selected = Edit::kTool;
+  bool moves = false;  // arrows on the selected object are shown
   // ---- requests to the session; the owner of the session takes counters and lists ----
   bool paused = false;
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;
+  double back_s = 0.0;  // how far before now the shown state is; the session pauses meanwhile; 0: the present
+  bool go_on = false;
   std::vector<Edit> edits{};
+  std::vector<SceneChange> changes{};
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look
 };
 
+// A change of the scene is shown as asked for, although nothing is built yet, for so many frames at most.
+inline constexpr int kFramesUntilBuilding = 30;
+
 // Least speed, as a share of real time. Speeds up to 1 are allowed.
 inline constexpr double kLeastSpeed = 1e-3;
+
+// Gives looks and selection to the objects of the same name in another scene.
+void go_to_scene(ViewState& state, const DrawnScene& before, const DrawnScene& after);
 
 // Applies an action. Only a window can apply key, click, drag and wheel.
 void act(ViewState& state, const ViewAction& action);

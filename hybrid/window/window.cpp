@@ -50,7 +50,7 @@ struct CloseWindow {
   void operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
 };
 
-enum class Drag { none, orbit, pan, tool, slice };
+enum class Drag { none, orbit, pan, tool, slice, object };
 
 constexpr int kMostPixels = 8192;    // most pixels along a side of a frame
 constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets
@@ -61,7 +61,7 @@ struct NamedKey {
   int ui;  // UiKey, or -1
 };
 constexpr auto ui = [](UiKey key) { return static_cast<int>(key); };
-constexpr std::array<NamedKey, 17> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::tab)},
+constexpr std::array<NamedKey, 19> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::tab)},
                                                {"left", GLFW_KEY_LEFT, ui(UiKey::left)},
                                                {"right", GLFW_KEY_RIGHT, ui(UiKey::right)},
                                                {"up", GLFW_KEY_UP, ui(UiKey::up)},
@@ -77,7 +77,9 @@ constexpr std::array<NamedKey, 17> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::t
                                                {"enter", GLFW_KEY_ENTER, ui(UiKey::enter)},
                                                {"escape", GLFW_KEY_ESCAPE, ui(UiKey::escape)},
                                                {"[", GLFW_KEY_LEFT_BRACKET, -1},
-                                               {"]", GLFW_KEY_RIGHT_BRACKET, -1}}};
+                                               {"]", GLFW_KEY_RIGHT_BRACKET, -1},
+                                               {",", GLFW_KEY_COMMA, -1},
+                                               {".", GLFW_KEY_PERIOD, -1}}};
 constexpr std::array<std::pair<char, UiKey>, 6> kLetters{
     {{'a', UiKey::a}, {'c', UiKey::c}, {'v', UiKey::v}, {'x', UiKey::x}, {'y', UiKey::y}, {'z', UiKey::z}}};
 
@@ -100,6 +102,7 @@ struct Window::State {
   glm::dvec3 device_m{0.0};  // device position in the last frame
   SoftBox box;               // of the scene
   std::size_t dragged_slice = 0;
+  ObjectMover mover;
   std::optional<glm::dvec3> goal_m;
   ViewState user;
   UiInput input;
@@ -155,6 +158,9 @@ struct Window::State {
       case Drag::slice:
         drag_slice({dx, dy});
         break;
+      case Drag::object:
+        mover.drag(camera, layout.scene, text_height(height), {dx, dy});
+        break;
       case Drag::none:
         break;
     }
@@ -182,7 +188,10 @@ struct Window::State {
     if (which > GLFW_MOUSE_BUTTON_MIDDLE) return;
     input.press_button(static_cast<std::size_t>(which), pressed && over_panel());
     if (!pressed) {
-      drag = Drag::none;
+      if (std::exchange(drag, Drag::none) == Drag::object) {
+        if (const auto change = mover.let_go(*scene))
+          hybrid::act(user, {.verb = ViewVerb::change, .change = *change});
+      }
       goal_m.reset();
       return;
     }
@@ -197,6 +206,10 @@ struct Window::State {
       grip_m = drag_plane_m - under_pointer();
       goal_m = drag_plane_m;
     } else if (which == GLFW_MOUSE_BUTTON_LEFT) {
+      if (mover.take(camera, layout.scene, text_height(height), {x, y})) {
+        drag = Drag::object;
+        return;
+      }
       const auto slice =
           slice_at(slice_frames(box, user.view), camera, layout.scene, {x, y}, text_height(height));
       drag = slice ? Drag::slice : Drag::orbit;
@@ -275,7 +288,8 @@ struct Window::State {
   }
 
   void paint(const Snapshot& snapshot, const SessionNotes& notes) {
-    const PanelFrame panel{user, history, notes, input};
+    mover.place(user, *scene, !notes.building.empty());
+    const PanelFrame panel{user, history, notes, input, camera, layout.scene, mover.handles()};
     FrameOptions options;
     options.width = std::min(width, kMostPixels);
     options.height = std::min(height, kMostPixels);
@@ -342,16 +356,25 @@ Window::Window(const DrawnScene& scene, const WindowOptions& options) {
 
 Window::~Window() = default;
 
-void Window::show_scene(const DrawnScene& scene) {
+void Window::show_scene(const DrawnScene& scene, std::optional<double> changed_at_s) {
   State& s = *state_;
   glfwMakeContextCurrent(s.window.get());
   s.painter->release();
+  go_to_scene(s.user, *s.scene, scene);
   s.scene = &scene;
   s.box = soft_box(scene);
+  s.mover = {};
+  s.user.back_s = 0.0;  // states of the scene before are not kept
   s.painter.emplace(scene, Samples::fast, s.height);
-  s.history.clear();
-  if (s.user.selected != Edit::kTool && s.user.selected >= scene.objects.size())
-    s.user.selected = Edit::kTool;
+  if (changed_at_s) {
+    s.history.mark(*changed_at_s);
+  } else {
+    s.history.clear();
+  }
+}
+
+const DrawnScene& Window::scene() const {
+  return *state_->scene;
 }
 
 bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
@@ -399,11 +422,14 @@ WindowInput Window::take_input() {
           .speed = s.user.speed,
           .restarts = s.user.restarts,
           .single_ticks = s.user.single_ticks,
+          .back_s = s.user.back_s,
           .asked = s.painter->asked(s.user.view),
           .edits = std::exchange(s.user.edits, {}),
+          .changes = std::exchange(s.user.changes, {}),
           .recording = std::exchange(s.user.recording, {}),
           .save_scene = std::exchange(s.user.save_scene, false),
-          .reload = std::exchange(s.user.reload, false)};
+          .reload = std::exchange(s.user.reload, false),
+          .go_on = std::exchange(s.user.go_on, false)};
 }
 
 std::optional<std::filesystem::path> Window::take_screenshot() {

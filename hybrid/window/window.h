@@ -32,11 +32,13 @@ struct WindowInput {
   bool wants_presses = false;  // the frame shows Snapshot::presses
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
+  double back_s = 0.0;                           // as ViewState::back_s
   std::shared_ptr<const AskedPoints> asked;      // points whose displacements the next frame needs, or null
   // ---- since the last call ----
   std::vector<Edit> edits;
+  std::vector<SceneChange> changes;
   std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name
-  bool save_scene = false, reload = false;
+  bool save_scene = false, reload = false, go_on = false;
 };
 
 // A frame's pixels: rows from the top, three bytes (RGB) each.
@@ -56,8 +58,10 @@ class Window {
   Window& operator=(Window&&) = delete;
   ~Window();
 
-  // Shows another scene from now on. View and selection stay. Keeps a reference to the scene.
-  void show_scene(const DrawnScene& scene);
+  // Shows another scene from now on. View, looks and selection stay. Keeps a reference to the scene.
+  // `changed_at_s`: time of the session at which it goes on in this scene; empty: a new session begins.
+  void show_scene(const DrawnScene& scene, std::optional<double> changed_at_s = {});
+  [[nodiscard]] const DrawnScene& scene() const;
 
   // Shows a snapshot and handles the input since the last call. Waits for the display's refresh. Returns
   // false if the user closed the window. Throws std::runtime_error if the driver fails.

@@ -7,7 +7,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kClipStep = 0.02;  // step of a press of [ or ], as a share of the scene's size
+constexpr double kBackStep_s = 1.0;  // step into the past of a press of , or .
+constexpr double kClipStep = 0.02;   // step of a press of [ or ], as a share of the scene's size
 
 struct KeyAction {
   std::string_view key;
@@ -15,7 +16,7 @@ struct KeyAction {
   std::string_view text{};
   double number = -1.0;  // negative: none
 };
-constexpr std::array<KeyAction, 25> kKeyActions{
+constexpr std::array<KeyAction, 29> kKeyActions{
     {{"space", ViewVerb::pause},      {"n", ViewVerb::step},
      {"r", ViewVerb::restart},        {"1", ViewVerb::speed, {}, 1.0},
      {"2", ViewVerb::speed, {}, 0.1}, {"3", ViewVerb::speed, {}, 0.01},
@@ -24,7 +25,9 @@ constexpr std::array<KeyAction, 25> kKeyActions{
      {"z", ViewVerb::look, "z"},      {"k", ViewVerb::clip},
      {"[", ViewVerb::clip_place},     {"]", ViewVerb::clip_place},
      {"v", ViewVerb::slice},          {"g", ViewVerb::slice_grey},
-     {"m", ViewVerb::colour},         {"t", ViewVerb::dark},
+     {"m", ViewVerb::colour},         {"o", ViewVerb::arrows},
+     {",", ViewVerb::look_back},      {".", ViewVerb::look_back},
+     {"b", ViewVerb::go_on},          {"t", ViewVerb::dark},
      {"h", ViewVerb::panels},         {"i", ViewVerb::inset},
      {"p", ViewVerb::screenshot},     {"w", ViewVerb::save_recording},
      {"l", ViewVerb::reload},         {"s", ViewVerb::save_scene},
@@ -46,6 +49,8 @@ std::optional<ViewAction> action_of_key(std::string_view key, bool control, cons
   if (at->number >= 0.0) action.numbers = {at->number};
   if (at->verb == ViewVerb::clip_place)
     action.numbers = {state.view.clip.share + (key == "[" ? -kClipStep : kClipStep)};
+  if (at->verb == ViewVerb::look_back)
+    action.numbers = {state.back_s + (key == "," ? kBackStep_s : -kBackStep_s)};
   return action;
 }
 

@@ -7,10 +7,13 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "hybrid/tick/proxy/proxy_step.h"
 #include "polygon/surface/rigid_surface.h"
 
 namespace hybrid {
 namespace {
+
+constexpr double kMostPlaces = 1000.0;  // that a search tries in one direction
 
 bool is_filled(const voxel::Lattice& lattice, const glm::dvec3& at) noexcept {
   std::array<int, 3> cell{};
@@ -26,6 +29,7 @@ bool is_filled(const voxel::Lattice& lattice, const glm::dvec3& at) noexcept {
 // Does a tool at `point` touch tissue at rest? A tool that reaches no surface voxel is outside, unless its
 // middle is in a filled voxel.
 bool touches_tissue(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+  if (state.soft.empty()) return false;
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (is_filled(state.soft[o]->lattice(), world.soft[o].to_body(point))) return true;
   }
@@ -56,32 +60,70 @@ bool touches_rigid(const World& world, const WorldState& state, const glm::dvec3
   return false;
 }
 
+bool is_outside(const World& world, WorldState& state, const glm::dvec3& point) noexcept {
+  return !touches_tissue(world, state, point) && !touches_rigid(world, state, point);
+}
+
+// Moves the proxy by `far_m` along an axis or diagonal of this frame, if a place there is outside everything.
+bool move_along_axes(const World& world, WorldState& state, const glm::dvec3& from, const glm::dquat& frame,
+                     double far_m) noexcept {
+  for (int n = 0; n < 27; ++n) {
+    const glm::dvec3 to(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    if (n == 13) continue;
+    const glm::dvec3 point = from + far_m * (frame * glm::normalize(to));
+    if (!is_outside(world, state, point)) continue;
+    state.proxy_m = point;
+    return true;
+  }
+  return false;
+}
+
+// The places that a search tries: up to `way_m` away, `step_m` apart.
+struct Search {
+  double step_m = std::numeric_limits<double>::max(), way_m = 0.0;
+};
+
+Search search_of_tissue(const World& world, const WorldState& state) noexcept {
+  Search search;
+  for (const auto& object : state.soft) {
+    const auto& dims = object->lattice().grid().dims;
+    search.step_m = std::min(search.step_m, object->lattice().min_spacing_m());
+    search.way_m += glm::length(object->lattice().spacing_m() * glm::dvec3(dims[0], dims[1], dims[2]));
+  }
+  search.way_m += 2.0 * world.tool.radius_m;
+  return search;
+}
+
 }  // namespace
 
 bool leave_tissue(const World& world, WorldState& state) noexcept {
   const glm::dvec3 from = state.proxy_m;
-  if (state.soft.empty() || !touches_tissue(world, state, from)) return true;
-  double step = std::numeric_limits<double>::max(), way = 0.0;
-  for (std::size_t o = 0; o < state.soft.size(); ++o) {
-    const voxel::Lattice& lattice = state.soft[o]->lattice();
-    const auto& dims = lattice.grid().dims;
-    step = std::min(step, lattice.min_spacing_m());
-    way += glm::length(lattice.spacing_m() * glm::dvec3(dims[0], dims[1], dims[2]));
-  }
-  way += 2.0 * world.tool.radius_m;
-  const auto steps = static_cast<std::int64_t>(way / step) + 1;
-  for (std::int64_t k = 1; k <= steps; ++k) {
-    const double far = static_cast<double>(k) * step;
-    for (std::size_t o = 0; o < state.soft.size(); ++o) {
-      for (int n = 0; n < 27; ++n) {
-        const glm::dvec3 to(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-        if (n == 13) continue;
-        const glm::dvec3 point = from + far * (world.soft[o].pose.rotation * glm::normalize(to));
-        if (touches_tissue(world, state, point) || touches_rigid(world, state, point)) continue;
-        state.proxy_m = point;
-        return true;
-      }
+  if (!touches_tissue(world, state, from)) return true;
+  const auto [step, way] = search_of_tissue(world, state);
+  for (double far = step; far <= way + step; far += step) {
+    for (const SoftBody& body : world.soft) {
+      if (move_along_axes(world, state, from, body.pose.rotation, far)) return true;
     }
+  }
+  return false;
+}
+
+bool start_outside(const World& world, WorldState& state, const glm::dvec3& device_m, const glm::dvec3& from,
+                   const glm::dvec3& towards) noexcept {
+  const bool outside_rigid = start_proxy(world, state, from);
+  state.device_m = device_m;
+  if (outside_rigid && !touches_tissue(world, state, state.proxy_m)) return true;
+  const double length = glm::length(towards);
+  const double radius = world.contact_radius_m(), way = world.extent_m + radius;
+  const double step = std::max(0.5 * radius, world.extent_m / kMostPlaces);
+  for (double far = step; length > 0.0 && far <= way; far += step) {
+    const glm::dvec3 point = from + towards * (far / length);
+    if (!is_outside(world, state, point)) continue;
+    state.proxy_m = point;
+    return true;
+  }
+  for (double far = step; far <= way; far += step) {
+    if (move_along_axes(world, state, from, glm::dquat(1.0, 0.0, 0.0, 0.0), far)) return true;
   }
   return false;
 }

@@ -12,4 +12,10 @@ namespace hybrid {
 // and the session must not start.
 bool leave_tissue(const World& world, WorldState& state) noexcept;
 
+// Starts the proxy of a session that goes on in tissue at rest, where the tool may be inside an object. The
+// proxy gets the first free place from `from` along `towards`, or else along an axis or diagonal of the
+// scene. False: there is none.
+bool start_outside(const World& world, WorldState& state, const glm::dvec3& device_m, const glm::dvec3& from,
+                   const glm::dvec3& towards) noexcept;
+
 }  // namespace hybrid

@@ -38,6 +38,16 @@ TEST(EditText, AValueIsReplacedOrAddedWhereverTheTableStands) {
        "height",
        "2",
        "[[rigid]]\nname = 'x'\n[[rigid]]\nname = 'y'\n[rigid.texture]\nheight = 2\n"},
+      {"[material.fat]\nyoung = 1\n[material.gel]\nyoung = 1\n",
+       {"material", "", "gel"},
+       "young",
+       "2",
+       "[material.fat]\nyoung = 1\n[material.gel]\nyoung = 2\n"},
+      {"[material]\ngel = { poisson = 0.3 }\n",
+       {"material", "", "gel"},
+       "young",
+       "2",
+       "[material]\ngel = { poisson = 0.3, young = 2 }\n"},
       {"[tool]\na = [\n 1, # one ]\n 2 ] # e\n", {"tool"}, "a", "7", "[tool]\na = 7 # e\n"},
       {"[tool]\na = \"\"\"\n[x]\n\"\"\" # e\n", {"tool"}, "a", "7", "[tool]\na = 7 # e\n"},
   };
@@ -53,6 +63,11 @@ TEST(EditText, WhatCannotBeChangedStaysAndIsSaid) {
       {"tool.radius = 2\n", {"tool"}, "stiffness", "5", "its place in the text was not found"},
       {"[tool]\nradius = 2\n", {"tool"}, "stiffness", "5 6", "its place in the text was not found"},
       {"[[soft]]\nname = 'a'\n", {"soft", "b"}, "spacing", "5", "its table is not in the scene's text"},
+      {"[material.fat]\nyoung = 1\n",
+       {"material", "", "gel"},
+       "young",
+       "5",
+       "its table is not in the scene's text"},
       {"[tool]\nradius = { a = 1 }\n", {"tool"}, "radius", "5", "it is written as a table"},
   };
   for (const EditCase& c : cases) {

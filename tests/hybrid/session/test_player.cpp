@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <sstream>
 #include <thread>
 
@@ -119,6 +120,63 @@ TEST_F(PlayerOf, PausesTicksOnceAndSlowsDown) {
   std::uint64_t samples = 0;
   while (player_->samples().pop(sample)) ++samples;
   EXPECT_EQ(samples, player_->ticks()) << "one for each tick";
+}
+
+// From one kept state the session goes on in two ways; each is replayed to its own end.
+TEST_F(PlayerOf, GoesBackToAKeptStateAndOnAnotherWay) {
+  for (const int relaxation : {0, 1, 2}) {
+    built_ = hybrid::build_scene(scene_);
+    player_ = std::make_unique<hybrid::Player>(scene_, built_, drawn_, nullptr);
+    std::unique_ptr<hybrid::RelaxationThread> thread;
+    if (relaxation == 1) player_->relax_at_once();
+    if (relaxation == 2) thread = player_->go_live(60.0);
+    steps(150);
+    player_->edit({0, Edit::kTool, coupling_stiffness, 450.0});
+    steps(150);
+    thread.reset();
+    player_->keep_state();
+    if (relaxation == 2) thread = player_->relaxation_thread(60.0);
+    const glm::dvec3 there = player_->felt().device_m;
+    player_->edit({0, Edit::kTool, coupling_stiffness, 900.0});
+    steps(200, {.dragging = true, .goal_m = {4e-3, 0.0, 3e-3}});
+    for (const bool aside : {true, false}) {
+      thread.reset();
+      player_->go_back(0);
+      if (relaxation == 2) thread = player_->relaxation_thread(60.0);
+      EXPECT_EQ(player_->ticks(), 300U);
+      EXPECT_EQ(player_->felt().device_m, there);
+      EXPECT_EQ(player_->recording(text_).edits.size(), 1U) << "later edits are forgotten";
+      const glm::dvec3 force = player_->felt().force_N;
+      steps(1);
+      EXPECT_LT(glm::distance(player_->felt().device_m, there), 0.2e-3) << "the hand goes on from there";
+      EXPECT_LT(glm::distance(player_->felt().force_N, force), 0.02);
+      steps(100, {.dragging = aside, .goal_m = {-4e-3, 0.0, 4e-3}});
+      thread.reset();
+      expect_replays();
+      if (relaxation == 2) thread = player_->relaxation_thread(60.0);
+    }
+  }
+}
+
+TEST_F(PlayerOf, KeepsTheLastMinuteOncePerSecond) {
+  for (int n = 0; n < 130; ++n) {
+    steps(500);
+    player_->keep_state();
+  }
+  ASSERT_GE(player_->kept().size(), 60U);
+  EXPECT_LE(player_->kept().size(), 61U);
+  const auto& kept = player_->kept();
+  for (std::size_t n = 1; n < kept.size(); ++n) EXPECT_EQ(kept[n].ticks - kept[n - 1].ticks, 1000U);
+  EXPECT_GT(kept.front().bytes, 10'000U);
+  hybrid::Snapshot snapshot;
+  player_->snapshot_of(kept[30], snapshot);
+  EXPECT_EQ(snapshot.tick, kept[30].ticks);
+  EXPECT_EQ(snapshot.device_m, kept[30].felt.device_m);
+  EXPECT_THROW(player_->go_back(99), std::runtime_error);
+  player_->go_back(30);
+  EXPECT_EQ(player_->kept().size(), 31U) << "the future is forgotten";
+  steps(10);
+  expect_replays();
 }
 
 }  // namespace

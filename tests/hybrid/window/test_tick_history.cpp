@@ -112,4 +112,27 @@ TEST(TickHistory, TimesAreThoseOfASortedList) {
   EXPECT_EQ(hybrid::TickTimes::bin_of(1e9), hybrid::TickTimes::kBins - 1);
 }
 
+TEST(TickHistory, AMarkSeparatesTheTicksBeforeAChangeFromThoseAfterIt) {
+  hybrid::TickHistory history(5.0);
+  for (int tick = 0; tick < 1000; ++tick) history.add(sample(tick, tick == 10 ? 6.0F : 1.0F));
+  history.mark(1000 * kTick_s);
+  for (int tick = 1000; tick < 1500; ++tick) {
+    auto after = sample(tick, 2.0F);
+    after.tick_us = 20.0F;
+    history.add(after);
+  }
+  ASSERT_TRUE(history.last_change());
+  EXPECT_EQ(history.last_change()->before.ticks, 1000U);
+  EXPECT_EQ(history.last_change()->before.p50_us, 50.0);
+  EXPECT_EQ(history.last_change()->most_before_N, 6.0);
+  const double from = history.last_change()->t_s;
+  EXPECT_EQ(history.times(from, 1e9).ticks, 500U);
+  EXPECT_EQ(history.times(from, 1e9).p99_us, 20.0);
+  EXPECT_EQ(history.most_N(ForceSeries::total, from, 1e9), 2.0);
+  history.mark(1500 * kTick_s);
+  EXPECT_EQ(history.last_change()->before.ticks, 500U) << "ticks before an earlier mark do not count";
+  history.add(sample(3, 1.0F));
+  EXPECT_FALSE(history.last_change()) << "a new session begins";
+}
+
 }  // namespace

@@ -181,4 +181,43 @@ TEST(ClipPlane, KeepsTheSideBeforeIt) {
   EXPECT_FALSE(hybrid::clip_equation(clip, bounds, {}).has_value());
 }
 
+TEST(ViewScript, ChangesOfTheSceneNameObjectsAndMaterials) {
+  using Key = hybrid::SceneChange::Key;
+  hybrid::DrawnScene scene = drawn();
+  scene.objects[1].choices = {.tissue = true, .materials = {{.name = "lung tissue", .young_Pa = 2e3}}};
+  ViewScript script(
+      "0 model \"left lung\" rigid\n0 energy \"left lung\" trilinear\n0 spacing \"left lung\" 2.5\n"
+      "0 young \"lung tissue\" 3000\n0 move bone 0 -1 2\n",
+      "tour.txt", scene);
+  hybrid::ViewState state;
+  for (const auto& action : script.due(0.0)) hybrid::act(state, action);
+  ASSERT_EQ(state.changes.size(), 5U);
+  EXPECT_EQ(state.changes[0].key, Key::model);
+  EXPECT_EQ(state.changes[0].value.x, 1.0);
+  EXPECT_DOUBLE_EQ(state.changes[2].value.x, 2.5e-3);
+  EXPECT_EQ(state.changes[3].name, "lung tissue");
+  EXPECT_EQ(state.changes[3].value.x, 3000.0);
+  EXPECT_DOUBLE_EQ(state.changes[4].value.z, 2e-3);
+  for (const std::string bad : {"0 model bone rigid", "0 model \"left lung\" jelly", "0 young iron 3",
+                                "0 spacing \"left lung\" 0", "0 move bone 1 2", "0 energy \"left lung\""}) {
+    EXPECT_THROW(ViewScript(bad, "tour.txt", scene), std::runtime_error) << bad;
+  }
+}
+
+TEST(ViewState, LooksAndSelectionGoWithTheObjectsName) {
+  hybrid::DrawnScene before = drawn(), after = drawn();
+  std::swap(after.objects[0], after.objects[1]);
+  hybrid::ViewState state;
+  hybrid::act(state, {.verb = ViewVerb::select, .object = 1});
+  hybrid::act(state, {.verb = ViewVerb::opacity, .numbers = {0.3}, .object = 1});
+  hybrid::go_to_scene(state, before, after);
+  EXPECT_EQ(state.selected, 0U);
+  EXPECT_FLOAT_EQ(state.view.look_of(0).opacity, 0.3F);
+  EXPECT_FLOAT_EQ(state.view.look_of(1).opacity, 1.0F);
+  before = after;
+  after.objects.erase(after.objects.begin());
+  hybrid::go_to_scene(state, before, after);
+  EXPECT_EQ(state.selected, Edit::kTool) << "the object is gone";
+}
+
 }  // namespace

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Changes of a scene that need a new world: the model, energy and spacing of an object, Young's modulus of a
+// material, the place of an object. The world is built beside the session, which then goes on in it.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+namespace hybrid {
+
+// One change. The object or the material has this name in the scene.
+struct SceneChange {
+  enum class Key : std::uint8_t {
+    model,    // x: 1 as rigid, through the proxy; 0 by its voxels
+    energy,   // x: 1 trilinear, 0 six-link
+    spacing,  // x: m, along the axis with the finest one; the ratios of the axes stay
+    young,    // x: Pa, of the material `name`
+    move,     // m, in the scene's frame: by how much the object is moved
+  };
+  Key key = Key::model;
+  std::string name{};
+  glm::dvec3 value{0.0};
+};
+
+struct SpacingChoice {
+  double spacing_m = 0.0;  // as SceneChange::value
+  std::string words{};     // "2 mm"
+};
+
+struct MaterialChoice {
+  std::string name{};
+  double young_Pa = 0.0;
+  std::string shared_with{};  // other objects of this material; empty: none
+};
+
+// The changes that one object allows.
+struct ObjectChoices {
+  bool open = false;    // it may be changed while it is felt; false: `note` says why not
+  bool tissue = false;  // the scene describes it as [[soft]], even if it is felt as rigid
+  bool as_rigid = false, trilinear = false;
+  bool other_model = false, other_energy = false;  // can it be changed?
+  double spacing_m = 0.0;
+  std::string spacing_words{};
+  std::vector<SpacingChoice> spacings{};  // without the present one
+  std::vector<MaterialChoice> materials{};
+  std::string note{};  // why something cannot be changed; may be empty
+};
+
+// Forces on the hand at one place before and after a change, with all tissue at rest, and voxels of all soft
+// objects.
+struct ChangeEffect {
+  std::string words{};  // the change
+  double t_s = 0.0;
+  double before_N = 0.0, after_N = 0.0, difference_jnd = 0.0;
+  bool at_rest = true;  // false: a force had not come to rest, and may be some percent off
+  std::size_t voxels_before = 0, voxels_after = 0;
+};
+
+}  // namespace hybrid

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Changes of a scene while it is felt: those that its objects allow, and the scene's text after a change.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "hybrid/scene/scene.h"
+#include "hybrid/snapshot/snapshot.h"
+
+namespace hybrid {
+
+// The choices of each drawn object. None is open if a rigid object moves, or with a real device, whose hand
+// would not stand still meanwhile. `as_read`: from read_scene(), with models as written. Reads the
+// headers of volumes. Throws SceneError, std::exception.
+void add_choices(const Scene& as_read, DrawnScene& drawn);
+
+// The scene's text after the changes; comments stay. Throws SceneError if `text` is no scene, and
+// std::runtime_error that says why a change cannot be made: no such object or material, or the text cannot be
+// edited safely.
+[[nodiscard]] std::string changed_text(const std::string& text, const std::filesystem::path& file,
+                                       std::span<const SceneChange> changes);
+
+// A change in words: "block: as rigid", "fat: 3 kPa".
+[[nodiscard]] std::string in_words(const SceneChange& change);
+
+}  // namespace hybrid
