@@ -106,7 +106,7 @@ void VideoFile::add(int width, int height, std::span<const unsigned char> rgb) {
         "{}: a frame has {} x {} pixels and the first had {} x {}; leave the window's size as it is",
         place_.asked.string(), width, height, width_, height_));
   while (!rgb.empty()) {
-    const ssize_t count = write(pipe_, rgb.data(), rgb.size());
+    const ssize_t count = ::write(pipe_, rgb.data(), rgb.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0)
       throw std::runtime_error(place_.asked.string() + ": ffmpeg takes no more frames; its reason is above");

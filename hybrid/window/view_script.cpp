@@ -192,7 +192,7 @@ class ScriptLine {
   }
 
   void read_change(ScriptArguments kind, ViewAction& action) const {
-    using Key = SceneChange::Key;
+    using ChangedKey = SceneChange::Key;
     constexpr double least_mm = 1e-3, most_mm = 1e6;   // of a spacing; scenes refuse others
     constexpr double least_Pa = 1e-3, most_Pa = 1e13;  // as a scene's file
     SceneChange& change = action.change;
@@ -207,23 +207,23 @@ class ScriptLine {
     };
     switch (kind) {
       case ScriptArguments::model:
-        change.key = Key::model;
+        change.key = ChangedKey::model;
         change.value.x = second("voxels", "rigid");
         break;
       case ScriptArguments::energy:
-        change.key = Key::energy;
+        change.key = ChangedKey::energy;
         change.value.x = second("six-link", "trilinear");
         break;
       case ScriptArguments::spacing:
-        change.key = Key::spacing;
+        change.key = ChangedKey::spacing;
         change.value.x = 1e-3 * number(3, least_mm, most_mm);
         break;
       case ScriptArguments::young:
-        change.key = Key::young;
+        change.key = ChangedKey::young;
         change.value.x = number(3, least_Pa, most_Pa);
         break;
       default:
-        change.key = Key::move;
+        change.key = ChangedKey::move;
         for (int d = 0; d < 3; ++d)
           change.value[d] = 1e-3 * number(3 + static_cast<std::size_t>(d), -most_mm, most_mm);
     }

@@ -137,7 +137,9 @@ TEST_F(RecordingFile, TheReplayHasTheDeviceThatWasUsedNotTheScenes) {
     hybrid::Scene scene = hybrid::load_scene(file);
     scene.device_model = c.used;
     hybrid::BuiltScene built = hybrid::build_scene(scene);
-    const hybrid::SessionResult result = hybrid::run_session(scene, built, {.keep_rows = false});
+    hybrid::SessionOptions options;
+    options.keep_rows = false;
+    const hybrid::SessionResult result = hybrid::run_session(scene, built, options);
     hybrid::save_recording(folder_ / "a.rec", recording_of(file, scene, result, false));
     const hybrid::ReplayResult again = hybrid::replay(hybrid::load_recording(folder_ / "a.rec"), {});
     EXPECT_TRUE(again.equal) << "parts at tick " << again.first_difference;
