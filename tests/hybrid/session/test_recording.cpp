@@ -132,7 +132,6 @@ TEST_F(RecordingFile, TheReplayHasTheDeviceThatWasUsedNotTheScenes) {
   };
   for (const Case& c : {Case{"[device]\nmodel = \"touch\"\n[safety]\npassivity = true\n", ideal},
                         Case{"[device]\nmodel = \"ideal\"\n", touch}}) {
-    SCOPED_TRACE(c.written);
     const auto file = write("other.toml", read(small_scene()) + c.written);
     hybrid::Scene scene = hybrid::load_scene(file);
     scene.device_model = c.used;
