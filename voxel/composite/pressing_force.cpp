@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The force of the tool on a CompositeGrid: the force that balances links and loads within one patch.
 //
-// The patch is the finest one outside which no bound of the tool holds a node. In most contacts it is that of
-// level 0. In deep presses, chains at their limits pass the tool's force on to nodes further away. The
-// reaction of the anchors would do for all contacts, but it is less exact: where links of a coarse level
-// differ from those of the finer one, as at gaps, force is lost or made at the side of a patch.
-#include <algorithm>
+// In most contacts it is the patch of level 0. In deep presses, chains at their limits pass the tool's force
+// on to nodes further away; then it is the patch that covers the object, whose sides are anchors alone. That
+// patch would do for all contacts, but it is less exact: where links of a coarse level differ from those of
+// the finer one, as at gaps, force is lost or made at the side of a patch.
 #include <cmath>
 
 #include "voxel/composite/grid.h"
@@ -24,11 +23,11 @@ constexpr double kHeldOutside = 0.02;
 // Measures the force of the tool and of rigid surfaces on the nodes of a patch along one axis, after a cycle
 // on that axis.
 void CompositeGrid::measure_pressing_force(std::size_t a) noexcept {
-  std::size_t l = 0;
   double force_N = force_on_patch(0, a);
   const double least_N = kHeldOutside * std::fabs(force_N);
+  std::size_t l = 0;
   for (std::size_t outer = covering_level_; outer > 0 && l == 0; --outer) {
-    if (std::fabs(force_of_tool_bounds(outer, a)) > least_N) l = std::min(outer + 1, covering_level_);
+    if (std::fabs(force_of_tool_bounds(outer, a)) > least_N) l = covering_level_;
   }
   if (l > 0) force_N = force_on_patch(l, a);
   pressing_force_N_[static_cast<int>(a)] = force_N;
