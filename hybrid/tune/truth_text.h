@@ -11,7 +11,7 @@ namespace hybrid {
 
 // For example "0.81 JND moving, 0.51 still"; p99.
 std::string in_words(const SettingError& error);
-// The truth and its error, and what is felt of the spacing and the shapes of the scene: a line each.
+// The truth with its own error, then the errors from the scene's spacing and from its shapes.
 std::string truth_words(const Truth& truth);
 
 nlohmann::ordered_json to_json(const SettingError& error);

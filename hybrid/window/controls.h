@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The controls of the panel, without the library that draws them; panels.cpp implements them. `id` tells the
-// controls of a panel apart and is not shown behind "##".
+// The controls of the panel. This header needs no library of controls; panels.cpp implements it with one.
+// Each control of a panel has its own `id`. Text after "##" in an `id` is not shown.
 #pragma once
 
 #include <array>

@@ -52,9 +52,7 @@ HYBRID_INLINE void transform_back(Float8 (&m)[kCorners]) {
 template <class Deferred>
 HYBRID_INLINE void add_forces(const BrickView& v, const BrickBlocks& blocks, const Deferred& deferred) {
   const int vectors = (v.cells[0] + 1 + kLanes - 1) / kLanes;
-  std::array<float, kMaxVectors * kLanes> uncovered;  // along x
-  for (int i = 0; i < vectors * kLanes; ++i)
-    uncovered[static_cast<std::size_t>(i)] = i >= v.covered_first[0] && i <= v.covered_last[0] ? 0.0F : 1.0F;
+  const RowMask uncovered = uncovered_lanes(v.covered_first[0], v.covered_last[0], vectors);
   for (int k = 0; k < v.cells[2]; ++k) {
     for (int j = 0; j < v.cells[1]; ++j) {
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
@@ -149,12 +147,14 @@ BrickBlocks brick_blocks(const BrickStiffness& brick) {
   return out;
 }
 
+namespace {
+
 // The strain of all components whose weight is not 0, as a part of `less` (bricks less links), with the share
 // by which it follows: the stiffnesses of brick and links are in the ratio r if all components take part in a
 // motion, and nearer to 1 if only one does. The share is best for the mean of both cases.
 MeanStrain take_strain(BrickBlocks& less, const BrickBlocks& links, std::size_t q,
                        const std::array<float, 3>& weight) {
-  MeanStrain out{q, weight};
+  MeanStrain out{.weight = weight};
   double sum = 0.0, of_links = 0.0, parts = 0.0;
   for (std::size_t a = 0; a < 3; ++a) {
     if (weight[a] == 0.0F) continue;
@@ -173,6 +173,8 @@ MeanStrain take_strain(BrickBlocks& less, const BrickBlocks& links, std::size_t 
   return out;
 }
 
+}  // namespace
+
 DeferredBrick deferred_brick(const BrickStiffness& brick, const BrickStiffness& links) {
   DeferredBrick out;
   out.rest = brick_blocks(difference(brick, links));
@@ -181,11 +183,11 @@ DeferredBrick deferred_brick(const BrickStiffness& brick, const BrickStiffness& 
   // h_d.
   std::array<float, 3> w{};
   for (std::size_t d = 0; d < 3; ++d) w[d] = std::sqrt(of_links.block[0][d][d] / of_links.block[0][0][0]);
-  out.strain[0] = take_strain(out.rest, of_links, 0, w);
   // In a plane of two axes, each component varies along the other axis.
-  out.strain[1] = take_strain(out.rest, of_links, 3, {w[1], w[0], 0.0F});
-  out.strain[2] = take_strain(out.rest, of_links, 5, {w[2], 0.0F, w[0]});
-  out.strain[3] = take_strain(out.rest, of_links, 6, {0.0F, w[2], w[1]});
+  const std::array<std::array<float, 3>, DeferredBrick::kStrains> weights{
+      {w, {w[1], w[0], 0.0F}, {w[2], 0.0F, w[0]}, {0.0F, w[2], w[1]}}};
+  for (std::size_t n = 0; n < DeferredBrick::kStrains; ++n)
+    out.strain[n] = take_strain(out.rest, of_links, DeferredBrick::kQ[n], weights[n]);
   return out;
 }
 
@@ -200,8 +202,7 @@ HYBRID_MULTIVERSIONED void add_deferred_forces(
       view, brick.rest, [&](const auto& m, auto& f, std::size_t at) __attribute__((always_inline)) {
 #pragma GCC unroll 4
         for (std::size_t s = 0; s < DeferredBrick::kStrains; ++s) {
-          constexpr std::array<std::size_t, DeferredBrick::kStrains> kQ{0, 3, 5, 6};
-          const std::size_t q = kQ[s];
+          const std::size_t q = DeferredBrick::kQ[s];
           const MeanStrain& of = brick.strain[s];
           Float8 known;
           load(known, strains[s] + at);

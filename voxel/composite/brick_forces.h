@@ -23,10 +23,9 @@ struct BrickBlocks {
 // Only for a matrix that is symmetric under the three mirrorings.
 [[nodiscard]] BrickBlocks brick_blocks(const BrickStiffness& brick);
 
-// A mean strain of a brick, as a sum over components a: weight[a] times component a of parity q ^ 2^a. Its
-// force on them is -stiffness · weight[a] · strain.
+// A mean strain of a brick: the sum over a of weight[a] times component a of parity q ^ 2^a, with the
+// strain's q. Its force on component a is −stiffness · weight[a] · strain.
 struct MeanStrain {
-  std::size_t q = 0;
   std::array<float, 3> weight{};
   float stiffness = 0.0F;
   float follows = 1.0F;  // share of a change of the strain that a cycle takes
@@ -36,8 +35,9 @@ struct MeanStrain {
 // times. So their strains are taken over cycles, each by its own share. All else is at most 1.4 times as
 // stiff, and is taken at once.
 struct DeferredBrick {
-  static constexpr std::size_t kStrains = 4;
-  std::array<MeanStrain, kStrains> strain;  // dilation; shears of the planes xy, xz, yz
+  static constexpr std::size_t kStrains = 4;  // dilation; shears of the planes xy, xz, yz
+  static constexpr std::array<std::size_t, kStrains> kQ{0, 3, 5, 6};
+  std::array<MeanStrain, kStrains> strain;
   BrickBlocks rest;
 };
 [[nodiscard]] DeferredBrick deferred_brick(const BrickStiffness& brick, const BrickStiffness& links);

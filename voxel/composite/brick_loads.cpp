@@ -9,7 +9,6 @@
 // stiff layer crosses the cell. So links and loads together are never less stiff than bricks of the softest
 // tissue, and cycles converge.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "voxel/composite/brick_forces.h"

@@ -262,11 +262,7 @@ float updated_weight(float limited, float weight, float limit_ratio, const LinkM
 HYBRID_MULTIVERSIONED double force_of_bounds(const LevelView& v, const std::array<int, 3>& finer_first,
                                              const std::array<int, 3>& finer_last) noexcept {
   const int vectors = static_cast<int>(v.stride / kLanes);
-  std::array<float, kMaxVectors * kLanes> uncovered;  // along x, in rows that cross the finer patch
-  for (std::size_t i = 0; i < v.stride; ++i) {
-    const int at = static_cast<int>(i);
-    uncovered[i] = at >= finer_first[0] && at <= finer_last[0] ? 0.0F : 1.0F;
-  }
+  const RowMask uncovered = uncovered_lanes(finer_first[0], finer_last[0], vectors);
   double sum = 0.0;
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     for (int j = v.first[1]; j <= v.last[1]; ++j) {

@@ -45,12 +45,8 @@ HYBRID_MULTIVERSIONED ModeResponse mode_response(const LevelView& v, const float
                                                  const std::array<int, 3>& finer_last) noexcept {
   const int vectors = static_cast<int>(v.stride / kLanes);
   // Masks along x. In rows that cross the finer patch the nodes inside that patch count 0.
-  std::array<float, kMaxVectors * kLanes> all_own, some_own;
-  for (std::size_t i = 0; i < v.stride; ++i) {
-    const int at = static_cast<int>(i);
-    all_own[i] = 1.0F;
-    some_own[i] = at >= finer_first[0] && at <= finer_last[0] ? 0.0F : 1.0F;
-  }
+  const RowMask all_own = uncovered_lanes(0, -1, vectors);
+  const RowMask some_own = uncovered_lanes(finer_first[0], finer_last[0], vectors);
   ModeResponse sum;
   for (int k = v.first[2]; k <= v.last[2]; ++k) {
     const bool under_k = k >= finer_first[2] && k <= finer_last[2];

@@ -51,9 +51,9 @@ double CompositeGrid::force_of_tool_bounds(std::size_t l, std::size_t a) noexcep
   return force_N;
 }
 
-// Force that balances the links and loads of a patch's unknowns (N). Forces of links and bricks within the
-// patch cancel. So what lies under finer patches does not matter, and loads count by those on the other
-// nodes.
+// Force that balances the links and loads of a patch's unknowns (N). Forces of links and bricks between two
+// unknowns cancel, so finer patches need no regard. The bricks' forces on all nodes of the patch sum to zero,
+// so the loads of the unknowns are minus those of the other nodes.
 double CompositeGrid::force_on_patch(std::size_t l, std::size_t a) noexcept {
   Level& level = levels_[l];
   const auto& nodes = level.nodes;

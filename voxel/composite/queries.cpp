@@ -232,6 +232,14 @@ std::size_t CompositeGrid::memory_bytes() const {
   }
   add(before_move_);
   add_limits(before_move_);
+  const auto add_floats = [&bytes](const Floats& array) { bytes += array.capacity() * sizeof(float); };
+  for (const Level& level : levels_) {
+    add_floats(level.brick_modulus);
+    for (const Floats& load : level.brick_load) add_floats(load);
+    for (const Floats& strain : level.brick_strain) add_floats(strain);
+  }
+  for (const Floats& strain : before_move_.brick_strain) add_floats(strain);
+  for (const Floats& force : bricks_.forces) add_floats(force);
   for (const HalfCells& plane : half_cells_) {
     for (const Floats* part : {&plane.cells, &plane.stiffness[0], &plane.stiffness[1], &plane.stiffness[2]})
       bytes += part->capacity() * sizeof(float);

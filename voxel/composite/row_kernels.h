@@ -19,6 +19,16 @@ namespace voxel::composite {
 inline constexpr float kNoBound = -1e30F;  // value of a bound array where there is no bound
 inline constexpr int kMaxVectors = 80;     // vectors of a row, at most
 
+// By lane of a row: 0 for the lanes first … last, which a finer patch covers, else 1. None is covered if last
+// < first.
+using RowMask = std::array<float, static_cast<std::size_t>(kMaxVectors* kLanes)>;
+[[nodiscard]] inline RowMask uncovered_lanes(int first, int last, int vectors) {
+  RowMask mask;
+  for (int i = 0; i < vectors * kLanes; ++i)
+    mask[static_cast<std::size_t>(i)] = i >= first && i <= last ? 0.0F : 1.0F;
+  return mask;
+}
+
 // One axis of one level, from its first row on.
 struct LevelView {
   float* u;
