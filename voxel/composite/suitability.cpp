@@ -2,13 +2,12 @@
 // Decides which objects can be solved on a CompositeGrid: by their materials and anchors, and by trial
 // contacts.
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <iterator>
 #include <limits>
 
 #include "voxel/composite/grid.h"
-#include "voxel/lattice/link_stiffness.h"
 
 namespace voxel {
 namespace {
@@ -23,46 +22,27 @@ constexpr double kMaxForceError = 0.14;
 // Forces are scaled to a press as deep as this share of the object's smallest side. Errors are relative to
 // the force, or to 0.57 N if the force is smaller: 7 % of 0.57 N is 0.04 N, which a hand does not feel.
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
-constexpr double kMaxThinShare = 0.02;  // of the stiffness of links at surfaces and where tissues meet
 
-// Share of the links' stiffness at surfaces and where tissues meet that belongs to links without a cell: of
-// sheets and rows of single voxels in air. Coarse levels know cells only. Looks at kRowsTried rows at most.
-double thin_tissue_share(const Lattice& lattice) {
-  constexpr RowId kRowsTried = 20000;
-  const Grid& g = lattice.grid();
-  RowId among = 0;
-  for (RowId row = 0; row < g.rows(); ++row) among += lattice.filled_in(row) > 0 && lattice.inside(row) == 0;
-  const RowId every = among / kRowsTried + 1;
-  double thin = 0.0, all = 0.0;
-  RowId number = 0;
-  const auto moduli_at = [&](const std::array<int, 3>& c) {
-    const std::uint8_t material = lattice.material(lattice.at(c[0], c[1], c[2]));
-    if (material == 0) return LinkModuli{};
-    const double young_Pa = lattice.materials()[material].young_Pa;
-    return LinkModuli{young_Pa, young_Pa};
+bool one_voxel_thick(const Lattice& lattice, VoxelId v) {
+  const auto alone_along = [&](int d) {
+    return !lattice.filled(lattice.up(v, d)) && !lattice.filled(lattice.down(v, d));
   };
-  for (RowId row = 0; row < g.rows(); ++row) {
-    if (lattice.filled_in(row) == 0 || lattice.inside(row) != 0 || number++ % every != 0) continue;
-    for (std::uint32_t lanes = lattice.filled_lanes(row); lanes != 0; lanes &= lanes - 1) {
-      const VoxelId v = row * kRow + static_cast<VoxelId>(std::countr_zero(lanes));
-      for (std::size_t d = 0; d < 3; ++d) {
-        if (!lattice.filled(lattice.up(v, static_cast<int>(d)))) continue;
-        std::array<LinkModuli, 9> links;
-        for (int n = 0; n < 9; ++n) {
-          auto from = lattice.coordinates(v);
-          from[(d + 1) % 3] += n % 3 - 1;
-          from[(d + 2) % 3] += n / 3 - 1;
-          auto to = from;
-          ++to[d];
-          links[index(n)] = softer(moduli_at(from), moduli_at(to));
-        }
-        const LinkParts parts = link_parts(links);
-        if (parts.cells.along_Pa == 0.0) thin += parts.thin.along_Pa;
-        all += parts.thin.along_Pa + parts.cells.along_Pa;
-      }
-    }
+  return alone_along(0) || alone_along(1) || alone_along(2);
+}
+
+// Voxels for trials: at most kPlaces of the surface, and as many of the parts that are one voxel thick in
+// air, which coarse levels resolve least. Both are evenly numbered.
+std::vector<VoxelId> trial_places(const Lattice& lattice) {
+  constexpr std::size_t kPlaces = 12;
+  const auto surface = lattice.surface();
+  std::vector<VoxelId> thin, places;
+  std::copy_if(surface.begin(), surface.end(), std::back_inserter(thin),
+               [&](VoxelId v) { return one_voxel_thick(lattice, v); });
+  for (const auto& voxels : {surface, std::span<const VoxelId>(thin)}) {
+    for (std::size_t n = 0; n < kPlaces && !voxels.empty(); ++n)
+      places.push_back(voxels[(2 * n + 1) * voxels.size() / (2 * kPlaces)]);
   }
-  return all > 0.0 ? thin / all : 0.0;
+  return places;
 }
 
 // The axis direction nearest to the inward normal. For a sheet one voxel thick, which has no such normal: the
@@ -98,16 +78,13 @@ CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
     const LinkLimit& l = lattice.tightest(d);
     if (l.along_low >= 0.0F || l.along_high <= 0.0F || l.across <= 0.0F) return {"its links have no slack"};
   }
-  if (thin_tissue_share(lattice) > kMaxThinShare) return {"much of it is one voxel thick, in air"};
   return CompositeGrid(lattice, kTrialHalfWidth).try_contacts();
 }
 
 // Trials at places all over the surface: cycles must converge to rest, and a pressed voxel must feel the
 // force that it feels with patches twice as wide.
 CompositeGrid::Suitability CompositeGrid::try_contacts() {
-  constexpr std::size_t kPlaces = 12;  // trials, at evenly numbered surface voxels
   CompositeGrid wide(lattice_, 2 * kTrialHalfWidth, 2 * kHalfWidth);
-  const auto surface = lattice_.surface();
   // Differences between neighbours stay below every limit, so that limits play no part.
   float least = std::numeric_limits<float>::max();
   for (const auto& d : limit_m_) {
@@ -120,8 +97,7 @@ CompositeGrid::Suitability CompositeGrid::try_contacts() {
     side_m = std::min(side_m, lattice_.grid().dims[index(d)] * lattice_.spacing_m()[d]);
   const double scale = std::max(kPressedShare * side_m / depth_m, 1.0);
   Suitability result;
-  for (std::size_t n = 0; n < kPlaces; ++n) {
-    const VoxelId v = surface[(2 * n + 1) * surface.size() / (2 * kPlaces)];
+  for (const VoxelId v : trial_places(lattice_)) {
     const Index3 place = lattice_.coordinates(v);
     if (lattice_.anchored(v)) continue;
     if (!converges_at(place, most_m)) return {"coarse levels do not come to rest"};
