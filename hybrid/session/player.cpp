@@ -121,6 +121,7 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
   kept_.clear();
   ++scenes_;
   edited_ = true;
+  if (reference_) begin_reference();
   return {.t_s = t_s(),
           .before_N = glm::length(before.force_N),
           .after_N = glm::length(after.force_N),
@@ -196,6 +197,38 @@ void Player::go_back(std::size_t n) {
   changes_.resize(kept.changes);
   changes_.push_back({.tick = ticks_, .edits_before = applied_.size(), .text = {}});
   edited_ = true;
+  if (reference_) begin_reference();
+}
+
+// Ends the reference if none can follow the session.
+void Player::begin_reference() {
+  reference_.reset();
+  if (!why_no_live_reference(*built_->world, *built_->state).empty()) return;
+  std::unique_ptr<WorldState> state = copy_state(*built_->world, *built_->state);
+  state->feel = built_->state->feel;
+  reference_ = std::make_unique<LiveReference>(*built_->world, std::move(state), dt_s_, jnd_floor_N(*scene_));
+}
+
+std::string Player::compare_with_rest(bool on) {
+  if (!on) {
+    reference_.reset();
+    return {};
+  }
+  take_edits();
+  begin_reference();
+  return why_no_live_reference(*built_->world, *built_->state);
+}
+
+void Player::add_to_reference() noexcept {
+  const WorldState& state = *built_->state;
+  const bool soft = std::any_of(state.reactions.begin(), state.reactions.end(),
+                                [](const voxel::Reaction& reaction) { return reaction.pressed > 0; });
+  reference_->passed(
+      {.tick = ticks_,
+       .t_s = t_s(),
+       .device_m = felt_.device_m,
+       .coupling_N = coupling_N_per_m(*built_->world, state) * (felt_.proxy_m - felt_.device_m),
+       .soft = soft});
 }
 
 void Player::snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked) const {
@@ -209,7 +242,10 @@ void Player::take_edits() noexcept {
   Edit edit;
   while (applied_.size() < kMostEdits && edits_.pop(edit)) {
     edit.tick = ticks_;
-    if (apply_edit(*built_->world, *built_->state, edit)) applied_.push_back(edit);
+    if (apply_edit(*built_->world, *built_->state, edit)) {
+      applied_.push_back(edit);
+      if (reference_) reference_->edited(edit);
+    }
     edited_ = true;
   }
 }
@@ -260,6 +296,7 @@ bool Player::advance(const PlayRequest& request, const device::ServoInput& input
   if (!request.dragging) goal_m_ = felt_.device_m;
   keep(input.device.fault);
   samples_.push(sample_of(felt_, t_s(), input.late_s, dt_s_));
+  if (reference_) add_to_reference();
   ++ticks_;
   return true;
 }

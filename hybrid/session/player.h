@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/reference/live_reference.h"
 #include "hybrid/session/recording.h"
 #include "hybrid/session/relaxation_thread.h"
 #include "hybrid/session/session.h"
@@ -115,6 +116,14 @@ class Player {
   }
   void snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked = nullptr) const;
 
+  // ---- the force at rest, meanwhile (live_reference.h) ----
+  // Begins or ends it. Call it as change_scene(). It begins anew with each change of the scene and on the way
+  // back. Returns why it cannot begin, or nothing.
+  std::string compare_with_rest(bool on);
+  [[nodiscard]] bool compares_with_rest() const noexcept { return reference_ != nullptr; }
+  // The next result, if there is one. Only the window's thread may call it.
+  bool next_at_rest(ForceAtRest& found) noexcept { return reference_ != nullptr && reference_->next(found); }
+
   // The thread that relaxes the tissue of the present scene, for a session that went live.
   [[nodiscard]] std::unique_ptr<RelaxationThread> relaxation_thread(double surfaces_hz);
   // Number of scenes before the present one.
@@ -159,6 +168,8 @@ class Player {
 
  private:
   void take_edits() noexcept;
+  void begin_reference();
+  void add_to_reference() noexcept;
   [[nodiscard]] bool tick_is_due(const PlayRequest& request) noexcept;
   void steer(const PlayRequest& request) noexcept;
   void keep(device::DeviceFault fault) noexcept;
@@ -187,6 +198,7 @@ class Player {
   std::uint32_t scenes_ = 0;
   SpscRing<Edit> edits_{kEditsWaiting};
   TickSamples samples_{kSamples};
+  std::unique_ptr<LiveReference> reference_;
   std::atomic<std::uint32_t> held_{0};
 };
 

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hybrid/reference/live_reference.h"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "hybrid/base/flush_to_zero.h"
+#include "hybrid/feel/just_noticeable.h"
+#include "hybrid/tick/tick.h"
+
+namespace hybrid {
+
+std::string why_no_live_reference(const World& world, const WorldState& state) {
+  if (state.soft.empty()) return "nothing in the scene is soft";
+  for (const RigidObject& object : world.rigid) {
+    if (object.motion.moves()) return "a rigid object moves, so nothing comes to rest";
+  }
+  for (const auto& object : state.soft) {
+    if (object->lattice().has_plasticity()) return "tissue keeps dents, so its force depends on the past";
+  }
+  return {};
+}
+
+ReferenceSession::ReferenceSession(const World& world, std::unique_ptr<WorldState> state, double dt_s,
+                                   double floor_N)
+    : world_(world), state_(std::move(state)), dt_s_(dt_s), floor_N_(floor_N) {}
+
+glm::dvec3 ReferenceSession::tick_at(const glm::dvec3& device_m) noexcept {
+  const TickResult felt = haptic_tick(world_, *state_, {.position_m = device_m}, dt_s_);
+  return coupling_N_per_m(world_, *state_) * (felt.proxy_m - felt.device_m);
+}
+
+std::optional<ForceAtRest> ReferenceSession::follow(std::span<const PassedTick> passed) noexcept {
+  if (passed.empty()) return std::nullopt;
+  const PassedTick& last = passed.back();
+  const bool soft =
+      std::any_of(passed.begin(), passed.end(), [](const PassedTick& tick) { return tick.soft; });
+  const std::size_t stride = soft ? passed.size() / kMostTicksOnWay + 1 : 1;
+  for (std::size_t n = stride - 1; n + 1 < passed.size(); n += stride) (void)tick_at(passed[n].device_m);
+  if (!last.soft) {
+    (void)tick_at(last.device_m);
+    return std::nullopt;
+  }
+  std::array<glm::dvec3, kRestTicks> before_N{};
+  for (std::size_t n = 0; n < kMostTicksAtRest; ++n) {
+    const glm::dvec3 now_N = tick_at(last.device_m);
+    glm::dvec3& earlier_N = before_N[n % kRestTicks];
+    if (n >= kRestTicks && jnd_of(earlier_N, now_N, floor_N_) < kAtRest_jnd)
+      return ForceAtRest{last.t_s, last.coupling_N, now_N, jnd_of(last.coupling_N, now_N, floor_N_)};
+    earlier_N = now_N;
+  }
+  return std::nullopt;
+}
+
+LiveReference::LiveReference(const World& world, std::unique_ptr<WorldState> state, double dt_s,
+                             double floor_N)
+    : session_(world, std::move(state), dt_s, floor_N) {
+  way_.reserve(kTicksWaiting);
+  thread_ = std::thread([this] { run(); });
+}
+
+LiveReference::~LiveReference() {
+  stop_.store(true, std::memory_order_relaxed);
+  thread_.join();
+}
+
+void LiveReference::take_edits_until(std::uint64_t tick) noexcept {
+  Edit edit;
+  while (waiting_ || edits_.pop(edit)) {
+    if (!waiting_) waiting_ = edit;
+    if (waiting_->tick > tick) return;
+    session_.take(*waiting_);
+    waiting_.reset();
+  }
+}
+
+void LiveReference::run() noexcept {
+  // The lowest priority: a session has precedence, and a late reference only says less often how far it is.
+  const sched_param none{};
+  (void)sched_setscheduler(0, SCHED_IDLE, &none);
+  set_flush_to_zero();  // as the tick does
+  while (!stop_.load(std::memory_order_relaxed)) {
+    way_.clear();
+    PassedTick tick;
+    while (way_.size() < kTicksWaiting && passed_.pop(tick)) way_.push_back(tick);
+    if (way_.empty()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      continue;
+    }
+    take_edits_until(way_.back().tick);
+    if (const auto found = session_.follow(way_)) (void)found_.push(*found);
+  }
+}
+
+}  // namespace hybrid
