@@ -62,9 +62,9 @@ struct SessionOptions {
   // Called kFrames_per_s times a second of the session, by the thread that runs it; not in real time. Must
   // not throw.
   std::function<void(const Snapshot&)> on_frame{};
-  // Greatest number of ticks, evenly spread, whose forces are compared with those of a slow run
+  // Compare the force of each tick in which something soft is in contact with that of a slow run
   // (force_error.h), and how carefully that run is played. In real time nothing is compared.
-  int reference_samples = 0;
+  bool measure_error = false;
   Reference reference = Reference::quick;
   // Clocks, counters and path begin as if this many ticks had passed, so that a soft start is over. The
   // forces do not depend on this number.
