@@ -16,7 +16,7 @@
 #include "hybrid/session/pair_presses.h"
 #include "hybrid/session/relaxation_thread.h"
 #include "hybrid/snapshot/fill_snapshot.h"
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/leave_tissue.h"
 #include "hybrid/tick/tissue/work_budget.h"

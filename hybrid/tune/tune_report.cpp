@@ -99,7 +99,8 @@ std::string doubt_about_cost(const TuneResult& result) {
   return text;
 }
 
-// A property of the scene that no setting changes, if it can be felt: its voxels are wide for this path.
+// Says that the scene's own voxels are too wide for this path. No setting can change this error. Empty if the
+// error cannot be felt.
 std::string about_scene(const TuneResult& result) {
   const Truth& truth = result.truth;
   if (!truth.spacing || truth.spacing->worst_jnd() < result.bounds.error_jnd) return {};

@@ -17,7 +17,8 @@ struct FrameLayout {
   PixelRect scene;
   PixelRect column;  // on the right; width 0 if the frame is too narrow for a column
   PixelRect key;     // between scene and panel: what the colours of tissue mean; width 0: none
-  // Square; at the lower end of the column, or of the scene if there is a panel; width 0 without a column.
+  // A square at the lower end of the column, or of the scene if there is a panel. Without a column its width
+  // is 0.
   PixelRect inset;
 
   // Pixel of the frame at which a camera shows a point in the scene's rectangle; empty if behind the eye.

@@ -65,7 +65,7 @@ class TickHistory {
   [[nodiscard]] double most_N() const;                    // of all series
   [[nodiscard]] double most_N(ForceSeries series, double from_s, double to_s) const;
   [[nodiscard]] TickTimes times() const;
-  // Of the ticks from `from_s` on and before `to_s`.
+  // The times of the ticks from `from_s` on and before `to_s`.
   [[nodiscard]] TickTimes times(double from_s, double to_s) const;
 
  private:

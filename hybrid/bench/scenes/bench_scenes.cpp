@@ -137,6 +137,7 @@ void play(const Variant& variant, const Motion& motion, bool timed, const Progre
 
 OverRepeats over(const std::vector<Percentiles>& repeats, double Percentiles::*which) {
   std::vector<double> values;
+  values.reserve(repeats.size());
   for (const Percentiles& p : repeats) values.push_back(p.*which);
   std::ranges::sort(values);
   return {values[values.size() / 2], values.front(), values.back()};

@@ -134,8 +134,8 @@ std::vector<float> TissueField::values(TissueColour colour, std::span<const glm:
 float TissueField::strain_at(const Stencil& stencil, std::span<const glm::vec3> moved_m) const {
   glm::dmat3 gradient(0.0);  // [d] derivative of the displacement (object's axes) along axis d
   for (int d = 0; d < 3; ++d) {
-    const std::uint32_t up = stencil.ends[static_cast<std::size_t>(2 * d)],
-                        down = stencil.ends[static_cast<std::size_t>(2 * d + 1)];
+    const std::uint32_t up = stencil.ends[2 * static_cast<std::size_t>(d)],
+                        down = stencil.ends[2 * static_cast<std::size_t>(d) + 1];
     const int links = (up != kNone ? 1 : 0) + (down != kNone ? 1 : 0);
     if (links == 0) continue;
     const glm::vec3 difference =
