@@ -119,7 +119,7 @@ bool voxels_left(const Setting& setting) {
 std::string about_proxies(const TuneResult& result) {
   const TunedSetting& chosen = result.settings[result.chosen];
   const bool enough = !voxels_left(chosen.setting) && result.choice.rule == ChoiceRule::cheapest_accurate;
-  const std::string said = enough ? " A proxy is enough here: no voxels are needed." : "";
+  std::string said = enough ? " A proxy is enough here: no voxels are needed." : "";
   if (chosen.match) {
     return fmt::format(
         "{} Its coupling is the tool's, so it is felt at every object. It fits depths up to {:.2f} mm, as on "
