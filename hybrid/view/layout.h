@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The parts of a frame and their places: a heading, the scene below it, and beside the scene a column. The
-// column holds the legend and the nearer view, so that neither covers the scene. Knows no graphics library.
+// column holds the legend and the nearer view, so that neither covers the scene. Uses no graphics library.
 #pragma once
 
 #include <optional>

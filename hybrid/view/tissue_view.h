@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a view shows of soft objects besides their surfaces: slices, and the values that colour tissue. Says
-// which displacements it needs, and takes them from snapshots. Knows no graphics library.
+// which displacements it needs, and takes them from snapshots. Uses no graphics library.
 #pragma once
 
 #include <memory>

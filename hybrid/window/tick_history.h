@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The ticks of the last seconds, for the window's charts. A pixel column stands for many ticks. It gets the
-// least and the largest force among them, so that no spike is lost. Knows no graphics library.
+// least and the largest force among them, so that no spike is lost. Uses no graphics library.
 #pragma once
 
 #include <array>

@@ -65,7 +65,7 @@ double largest_eigenvalue(const glm::dmat3& a) {
   return std::abs(high) >= std::abs(low) ? high : low;
 }
 
-// Share of a limit; a difference against a limit of 0 counts as the whole limit.
+// The difference as a share of the limit, at most 1. If the limit is 0, any difference is the whole share.
 float share_of(float difference_m, float limit_m, float rounding_m) {
   if (!(difference_m > rounding_m)) return 0.0F;
   return limit_m > rounding_m ? std::min(difference_m / limit_m, 1.0F) : 1.0F;
