@@ -203,7 +203,7 @@ void refuse_unused(const CLI::App& bench, const std::string& suite) {
         std::find(suites.begin(), suites.end(), suite) != suites.end())
       continue;
     std::string takers;
-    for (const std::string& taker : suites) takers += "bench " + taker + ", ";
+    for (const std::string& taker : suites) takers.append("bench ").append(taker).append(", ");
     throw CLI::ValidationError(std::string(option.name) + " has no effect in bench " + suite +
                                "; leave it out, or use it with " + takers + "or bench all");
   }
