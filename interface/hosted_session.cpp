@@ -177,7 +177,7 @@ void HostedSession::save_recording(const std::filesystem::path& file) const {
                                 .edits = applied_});
 }
 
-hybrid::ForceError HostedSession::measure_error(int samples) const {
+hybrid::ForceError HostedSession::measure_error() const {
   hybrid::ForceError error;
   error.not_measured = not_recorded();
   if (built_.state->soft.empty()) error.not_measured = "nothing is soft";
@@ -190,7 +190,6 @@ hybrid::ForceError HostedSession::measure_error(int samples) const {
   hybrid::SlowRunOptions slow = hybrid::slow_run_options(hybrid::Reference::quick);
   slow.dt_s = period_s_;
   slow.floor_N = hybrid::jnd_floor_N(source_.scene);
-  slow.most = samples;
   slow.async_relaxation = options_.relaxation != Relaxation::tick;
   return hybrid::compare_with_slow_run(*built_.world, *state, course_, slow);
 }

@@ -75,7 +75,7 @@ class HostedSession {
   // Call it only if not_recorded() is empty. Throws std::runtime_error if the file cannot be written.
   void save_recording(const std::filesystem::path& file) const;
   // ForceError::not_measured says why nothing was compared.
-  [[nodiscard]] hybrid::ForceError measure_error(int samples) const;
+  [[nodiscard]] hybrid::ForceError measure_error() const;
 
   // ---- reader ----
   // Takes the newest published surfaces; false if there are none that are newer. Call it only if surfaces()

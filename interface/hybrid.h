@@ -30,7 +30,7 @@ extern "C" {
 #endif
 
 /* Version of this header. A library is compatible if hybrid_abi_version() returns the same number. */
-#define HYBRID_ABI_VERSION 1
+#define HYBRID_ABI_VERSION 2
 
 typedef enum hybrid_code {
   HYBRID_OK = 0,
@@ -238,9 +238,9 @@ typedef struct hybrid_error {
 
 /* [servo] The error of the tissue's force so far, as `hybrid run` reports it: against the same motion, played
  * five times slower, ten times while the device is still. Takes about twice as long as the session. Compares
- * `samples` ticks in which something soft was in contact. Needs with_error and recorded_ticks;
+ * every tick in which something soft was in contact. Needs with_error and recorded_ticks;
  * HYBRID_NOT_AVAILABLE if nothing can be compared. */
-hybrid_code hybrid_measure_error(hybrid_session* session, uint32_t samples, hybrid_error* out);
+hybrid_code hybrid_measure_error(hybrid_session* session, hybrid_error* out);
 
 #ifdef __cplusplus
 }

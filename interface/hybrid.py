@@ -177,7 +177,7 @@ _declare("hybrid_take_snapshot", _handle, _pointer)
 _declare("hybrid_vertices", _handle, _u32, _pointer, ctypes.c_size_t, _pointer)
 _declare("hybrid_triangles", _handle, _u32, _pointer, ctypes.c_size_t)
 _declare("hybrid_save_recording", _handle, _text)
-_declare("hybrid_measure_error", _handle, _u32, _pointer)
+_declare("hybrid_measure_error", _handle, _pointer)
 
 
 def _need(code: int) -> None:
@@ -439,9 +439,9 @@ class Session:
         """Writes the session so far: `hybrid replay FILE` plays it to the same hash. Needs record=."""
         _need(_library.hybrid_save_recording(self._handle, os.fsencode(file)))
 
-    def measure_error(self, samples: int = 200) -> ForceError:
+    def measure_error(self) -> ForceError:
         """The error of the tissue's force so far, against the same motion played five times slower, ten
         times while the device is still. Takes about twice as long as the session. Needs record= and error=True."""
         found = _ForceError()
-        _need(_library.hybrid_measure_error(self._handle, samples, ctypes.byref(found)))
+        _need(_library.hybrid_measure_error(self._handle, ctypes.byref(found)))
         return ForceError(**{name: getattr(found, name) for name, _ in _ForceError._fields_[1:]})

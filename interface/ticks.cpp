@@ -202,13 +202,11 @@ hybrid_code hybrid_save_recording(hybrid_session* session, const char* file) {
       HYBRID_FILE);
 }
 
-hybrid_code hybrid_measure_error(hybrid_session* session, uint32_t samples, hybrid_error* out) {
+hybrid_code hybrid_measure_error(hybrid_session* session, hybrid_error* out) {
   constexpr const char* kWhere = "hybrid_measure_error";
   return in_servo(kWhere, session, [&](const HostedSession& opened) {
     if (const hybrid_code code = check_struct(kWhere, out); code != HYBRID_OK) return code;
-    if (samples == 0 || samples > static_cast<std::uint32_t>(std::numeric_limits<int>::max()))
-      return fail(HYBRID_BAD_VALUE, kWhere, "samples is 0 or more than 2147483647; 200 are usual");
-    const hybrid::ForceError error = opened.measure_error(static_cast<int>(samples));
+    const hybrid::ForceError error = opened.measure_error();
     if (!error.not_measured.empty())
       return fail(HYBRID_NOT_AVAILABLE, std::string(kWhere) + ": " + error.not_measured);
     hybrid_error found{};

@@ -54,7 +54,7 @@ class PhantomServo {
 
   // The servo callback; `servo` is a PhantomServo. It never allocates, locks, throws or does I/O of its own.
   static unsigned int on_tick(void* servo) noexcept;
-  // For OnCrash: safe in a signal handler.
+  // The handler for OnCrash. It is safe in a signal handler.
   static void on_crash(void* servo) noexcept;
 
   void stop() noexcept { stop_.store(true); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The contents of the map and the places of look-ups in `hybrid bench occupancy`, all from closed formulas.
-// The contents are a ball of voxels, with only its surface or all of it, or the surface as triangles.
+// The contents are a ball. The map holds it in one of three forms: all of its voxels, its surface voxels, or
+// its surface as triangles.
 #pragma once
 
 #include <cstdint>

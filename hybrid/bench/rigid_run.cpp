@@ -11,7 +11,7 @@
 
 #include "hybrid/build/build_world.h"
 #include "hybrid/tick/bodies/move_bodies.h"
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "hybrid/tick/tick.h"
 #include "polygon/reference/cgal_surface.h"
 #include "polygon/surface/mesh_surface.h"
@@ -30,7 +30,8 @@ struct Box {
   glm::dvec3 low, high;
 };
 
-// As the program fills it: cells of half the tool, or as many as its limit allows.
+// The map as a session fills it. A cell is half as wide as the tool, or wider if the number of cells would
+// exceed the map's limit.
 OccupancyMap fill_map(const polygon::TriangleMesh& mesh, const Box& box, double tool_radius_m,
                       const glm::dvec3& offset_m, bool moves) {
   const glm::dvec3 size = box.high - box.low;
@@ -184,10 +185,10 @@ void TouchWorld::move_body(const glm::dvec3& body_m) {
 RigidStep TouchWorld::step(const glm::dvec3& goal_m) noexcept {
   if (tree_) return step_finger(goal_m);
   if (engine_ == Engine::whole_tick) return step_whole(goal_m);
-  return step_rigid(world_, *state_, goal_m, kTick_s);
+  return step_rigid(world_, *state_, goal_m);
 }
 
-// It has arrived or not: would_go_on() says so after the run, outside of the timing.
+// `arrived` is not set: would_go_on() finds out after the run, outside of the timing.
 RigidStep TouchWorld::step_finger(const glm::dvec3& goal_m) noexcept {
   const polygon::FingerStep step = polygon::finger_step(*tree_, finger_, proxy_in_body_, goal_m - body_m_);
   proxy_in_body_ = step.point;

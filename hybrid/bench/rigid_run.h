@@ -13,7 +13,7 @@
 #include "hybrid/bench/meshes.h"
 #include "hybrid/bench/paths.h"
 #include "hybrid/bench/timer.h"
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "hybrid/world/world_state.h"
 #include "polygon/reference/finger_proxy.h"
 

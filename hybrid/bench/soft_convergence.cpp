@@ -28,7 +28,9 @@ Object object_of(const std::array<int, 3>& dims, const std::array<int, 3>& pushe
   Object object;
   object.volume.dims = dims;
   object.volume.spacing_m = glm::dvec3(kSoftSpacing_m);
-  object.volume.labels.assign(static_cast<std::size_t>(dims[0] * dims[1] * dims[2]), 1);
+  std::size_t voxels = 1;
+  for (const int count : dims) voxels *= static_cast<std::size_t>(count);
+  object.volume.labels.assign(voxels, 1);
   object.pushed = pushed;
   object.movement = movement;
   return object;

@@ -16,7 +16,6 @@ namespace {
 // Slack as a share of the rest length; speed of the tool (m/s); its radius (m).
 constexpr double kSlack = 0.1, kSpeed = 0.5, kToolRadius = 8.0 * kSoftSpacing_m;
 constexpr double kMostDepth = 20.0;  // unit: spacing
-constexpr int kSamples = 1'000'000;  // of the force's error; enough for all ticks in which tissue is pressed
 
 // At slack 0.1 a push reaches ten times as far as it is deep, and no chain is longer than the cube. So small
 // cubes are pressed less deep: the tool must feel the tissue, not its anchors.
@@ -86,7 +85,7 @@ SoftRow session_row(int edge, const Scene& scene, BuiltScene& built, const SoftB
                                            {.seconds = options.session_s,
                                             .keep_rows = false,
                                             .keep_recording = false,
-                                            .reference_samples = kSamples,
+                                            .measure_error = true,
                                             .reference = Reference::full,
                                             .progress = {},
                                             .async_relaxation = true});

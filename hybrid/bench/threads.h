@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `hybrid bench threads`: cost of the servo thread's ticks while relaxation and snapshots use the other
-// cores. It is compared with the cost of the same ticks, equal to the last bit, while the other cores run
-// something unrelated that only moves memory.
+// cores. The same ticks are also timed while the other cores run unrelated work that only moves memory. Their
+// results are equal to the last bit.
 #pragma once
 
 #include <cstdint>

@@ -121,7 +121,7 @@ SessionResult play(const Scene& scene, BuiltScene& built, const SessionOptions& 
 
 }  // namespace
 
-ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, const Progress& progress) {
+ScenesComparison compare_scenes(std::span<const Scene> scenes, bool own_errors, const Progress& progress) {
   if (scenes.empty()) throw std::invalid_argument("compare_scenes: no scene");
   for (const Scene& scene : scenes) require_comparable(scenes.front(), scene);
   const std::vector<std::string> names = scene_names(scenes);
@@ -152,7 +152,7 @@ ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, cons
       SessionOptions options;
       options.keep_rows = last;
       options.keep_recording = false;
-      options.reference_samples = last ? samples : 0;
+      options.measure_error = last && own_errors;
       options.progress = progress;
       options.async_relaxation = true;
       options.path = path;

@@ -54,10 +54,9 @@ struct ScenesComparison {
   double jnd_floor_N = 0.0;
 };
 
-// `samples`: at most so many ticks of each scene are compared with its own slow run (SessionOptions); 0:
-// none. Throws SceneError. Throws std::runtime_error: tools of another shape or size, or devices at another
-// rate.
-ScenesComparison compare_scenes(std::span<const Scene> scenes, int samples, const Progress& progress);
+// `own_errors`: each scene is also compared with its own slow run (SessionOptions::measure_error). Throws
+// SceneError. Throws std::runtime_error: tools of another shape or size, or devices at another rate.
+ScenesComparison compare_scenes(std::span<const Scene> scenes, bool own_errors, const Progress& progress);
 
 // The size of a built scene before a session.
 struct SceneSize {

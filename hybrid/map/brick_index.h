@@ -207,8 +207,8 @@ class BrickIndex : public BrickGrid {
     clear_bit(at, [this](const CellCoordinates& c) { return find(c) != kNone; });
   }
 
-  // Makes room for `more` bricks, which then need no allocation, and makes the bitmap over the existing
-  // bricks. Bricks added later beyond the bitmap share its outermost units.
+  // Makes the bitmap over the existing bricks, and room for `more` bricks. These need no allocation when they
+  // are added. Those beyond the bitmap share its outermost units.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     table_.seal(more, moved);

@@ -28,7 +28,7 @@ bool told_through_tool(const ModelRow& row, const ObjectModels& object) {
                              [](const std::string& by) { return by != kByFinger; });
 }
 
-// With three digits, but no decimals from 100 on.
+// The number in three digits. From 100 on it has no decimals.
 std::string short_number(double value) {
   return with_decimals(value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0);
 }

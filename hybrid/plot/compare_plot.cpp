@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 
@@ -21,6 +22,9 @@ constexpr double kTurned_deg = 15.0;           // the panel of angles is drawn i
 // Share of a contact's largest force; a pull beyond it is drawn with its sign.
 constexpr double kReversedShare = 0.1;
 constexpr double kShownOutside_m = 1e-3;  // force over depth begins this far outside the object
+// A model whose largest force in a contact is this many times that of the reference would flatten the other
+// lines. It has a panel of its own.
+constexpr double kFlattens = 4.0;
 constexpr const char* kReferenceColour = "#8a8a8a";
 
 // y at each x of `at`, linear between samples. There are gaps outside the range of x and beside samples that
@@ -251,11 +255,26 @@ class ComparePlot {
                   with_decimals(contact.from_s, 2) + " to " + with_decimals(contact.to_s, 2) + " s";
     panel.y_label = "force (N)";
     panel.from_zero = true;
-    bool known = false;
+    // The reference is drawn first, so that it hides no other line.
+    const Series reference = line_of(options_.reference, contact);
+    bool known = !reference_.depth_m.empty();
+    panel.series.push_back(reference);
+    std::vector<Panel> stronger;
     for (std::size_t m = 0; m < models_.size(); ++m) {
-      if (models_[m].apart) continue;
+      if (models_[m].apart || m == options_.reference) continue;
       known = known || !models_[m].depth_m.empty();
-      panel.series.push_back(line_of(m, contact));
+      Series line = line_of(m, contact);
+      if (largest(line) <= kFlattens * largest(reference)) {
+        panel.series.push_back(std::move(line));
+        continue;
+      }
+      Panel own;
+      own.title = models_[m].name + (stroke ? ": force over path length" : ": force over depth");
+      own.y_label = "force (N)";
+      own.height = 120.0;
+      own.from_zero = true;
+      own.series = {{reference.name, reference.x, reference.y, kReferenceColour, 1.2}, std::move(line)};
+      stronger.push_back(std::move(own));
     }
     for (const ReferenceCurve& curve : curves_) {
       std::vector<double> depth_mm = curve.depth_m;
@@ -267,7 +286,17 @@ class ComparePlot {
                     : known ? "depth of the device (mm)"
                             : "depth of the device since the first touch (mm)";
     group.panels.push_back(std::move(panel));
+    std::ranges::move(stronger, std::back_inserter(group.panels));
     return group;
+  }
+
+  // The largest force of a line (N); gaps do not count.
+  static double largest(const Series& line) {
+    double most = 0.0;
+    for (std::size_t i = 0; i < line.y.size(); ++i) {
+      if (std::isfinite(line.x[i]) && line.y[i] > most) most = line.y[i];
+    }
+    return most;
   }
 
   std::span<const ComparedModel> models_;

@@ -378,8 +378,9 @@ std::string to_svg(const Figure& figure) {
       y += height + 14.0;
       std::string note = panel.note;
       if (panel.lanes.size() > lanes) {
-        const std::string more = "and " + std::to_string(panel.lanes.size() - lanes) + " more, not shown";
-        note = note.empty() ? more : more + "; " + note;
+        std::string more = "and " + std::to_string(panel.lanes.size() - lanes) + " more, not shown";
+        if (!note.empty()) more.append("; ").append(note);
+        note = std::move(more);
       }
       if (!note.empty()) {
         svg.text(left, y + 2.0, note, "class=\"t p\"");

@@ -29,9 +29,10 @@ void add_compare(CLI::App& app, int& status) {
   auto* samples =
       sub->add_option(
              "--samples", c->samples,
-             "of two or more scenes: most ticks in which each is compared with itself played slowly, "
-             "which takes several times as long as the session; 0: none; default: all")
-          ->check(CLI::Range(0, 1'000'000));
+             "of two or more scenes: ticks in which each is compared with itself played slowly, which takes "
+             "several times as long as the session: all in contact, or 0")
+          ->check(CLI::IsMember({"0", "all"}))
+          ->capture_default_str();
   device::MeasuredFile& file = c->measured.measured;
   auto* measured = sub->add_option(
       "--measured", file.file, "compare the whole scene with forces measured along a motion (.traj, .csv)");

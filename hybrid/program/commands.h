@@ -26,7 +26,7 @@ struct RunCommand {
   std::optional<double> seconds;
   bool realtime = false;
   std::string device;               // replaces the scene's device; empty: the scene's
-  int samples = 1'000'000;          // ticks whose force is compared with a slow run; by default all
+  std::string samples = "all";      // ticks in contact whose force is compared with a slow run, or "0"
   std::string reference = "quick";  // "quick" or "full" (Reference)
   std::uint64_t start_ticks = 0;
   // Where tissue away from the contact is relaxed: "apart" (on a thread of its own) or "tick".
@@ -70,7 +70,7 @@ int devices(const DevicesCommand& command);
 
 struct CompareCommand {
   std::vector<std::filesystem::path> scenes;  // one: an object of it by several models; more: whole scenes
-  int samples = 1'000'000;                    // only for whole scenes; as in RunCommand
+  std::string samples = "all";                // only for whole scenes; as in RunCommand
   std::string object;                         // empty: the first suitable object
   MeasuredOptions measured;                   // empty file: no measurement
   std::filesystem::path plot;

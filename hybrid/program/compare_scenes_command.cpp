@@ -156,7 +156,7 @@ int compare_whole_scenes(const CompareCommand& command) {
   outputs.ask_json(command.json);
   std::vector<Scene> scenes;
   for (const std::filesystem::path& file : command.scenes) scenes.push_back(load_scene(file));
-  const ScenesComparison comparison = compare_scenes(scenes, command.samples, progress_on_terminal());
+  const ScenesComparison comparison = compare_scenes(scenes, command.samples != "0", progress_on_terminal());
   end_progress();
   const nlohmann::ordered_json report = scenes_report(command, comparison);
   outputs.write_json(command.json, report);
@@ -174,7 +174,7 @@ int compare_whole_scenes(const CompareCommand& command) {
       "all, and no force is limited\n\n",
       scenes.size(), comparison.scenes.front().name);
   for (const std::string& note : comparison.notes) fmt::print(words, "note: {}\n", note);
-  print_scenes(words, comparison, command.samples > 0);
+  print_scenes(words, comparison, command.samples != "0");
   outputs.say_files();
   return outputs.failed() ? 1 : 0;
 }

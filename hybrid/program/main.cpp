@@ -49,8 +49,8 @@ void add_run(CLI::App& app, int& status) {
   add_device(*sub, c->device);
   auto* samples = sub->add_option(
       "--samples", c->samples,
-      "most ticks whose force of tissue is compared with the same path played slowly; 0: none; default: all");
-  samples->check(CLI::Range(0, 1'000'000));
+      "ticks whose force of tissue is compared with the same path played slowly: all in contact, or 0");
+  samples->check(CLI::IsMember({"0", "all"}))->capture_default_str();
   auto* reference = sub->add_option("--reference", c->reference, "5 (quick) or 10 (full) times slower");
   reference->check(CLI::IsMember({"quick", "full"}))->capture_default_str();
   sub->add_option("--start-ticks", c->start_ticks,
@@ -82,9 +82,9 @@ void add_run(CLI::App& app, int& status) {
       throw CLI::ValidationError("--video", "cannot be drawn in real time; leave out --realtime");
     if (colour->count() > 0 && c->picture.empty() && c->video.empty())
       throw CLI::ValidationError("--colour", "has no effect without --picture or --video");
-    if (samples->count() > 0 && c->samples > 0 && c->realtime)
+    if (samples->count() > 0 && c->samples != "0" && c->realtime)
       throw CLI::ValidationError("--samples", "has no effect with --realtime; leave one of them out");
-    if (reference->count() > 0 && (c->realtime || c->samples == 0))
+    if (reference->count() > 0 && (c->realtime || c->samples == "0"))
       throw CLI::ValidationError("--reference", "has no effect with --realtime or --samples 0");
     status = hybrid::run(*c);
   });
@@ -203,7 +203,7 @@ void refuse_unused(const CLI::App& bench, const std::string& suite) {
         std::find(suites.begin(), suites.end(), suite) != suites.end())
       continue;
     std::string takers;
-    for (const std::string& taker : suites) takers += "bench " + taker + ", ";
+    for (const std::string& taker : suites) takers.append("bench ").append(taker).append(", ");
     throw CLI::ValidationError(std::string(option.name) + " has no effect in bench " + suite +
                                "; leave it out, or use it with " + takers + "or bench all");
   }

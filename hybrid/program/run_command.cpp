@@ -186,7 +186,7 @@ int run(const RunCommand& command) {
                          .between_samples = kBetweenSamples,
                          .between_every_tick = !command.trace.empty(),
                          .keep_picture = !command.picture.empty() || paged,
-                         .reference_samples = command.samples,
+                         .measure_error = command.samples != "0",
                          .reference = command.reference == "full" ? Reference::full : Reference::quick,
                          .start_ticks = command.start_ticks,
                          .progress = progress,

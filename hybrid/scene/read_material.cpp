@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "hybrid/scene/read_rigid.h"
+#include "hybrid/scene/read_objects.h"
 
 namespace hybrid {
 namespace {

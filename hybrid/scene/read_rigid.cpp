@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads the keys that all objects have in common, and the [[rigid]] tables.
-#include "hybrid/scene/read_rigid.h"
+#include "hybrid/scene/read_objects.h"
 
 #include <algorithm>
 #include <cmath>

@@ -12,8 +12,8 @@
 
 #include "hybrid/scene/ranges.h"
 #include "hybrid/scene/read_material.h"
+#include "hybrid/scene/read_objects.h"
 #include "hybrid/scene/read_path.h"
-#include "hybrid/scene/read_rigid.h"
 #include "hybrid/scene/read_scene_text.h"
 #include "hybrid/scene/scene.h"
 #include "hybrid/scene/table_reader.h"

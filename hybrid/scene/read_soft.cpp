@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "hybrid/scene/read_rigid.h"
+#include "hybrid/scene/read_objects.h"
 
 namespace hybrid {
 namespace {

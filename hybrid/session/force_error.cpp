@@ -167,8 +167,6 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
   std::vector<bool> wide(state.soft.size(), false);
   const std::vector<std::size_t> still = ticks_still(course, options.dt_s);
   const std::vector<bool> slow = slow_ticks(course, still, options.dt_s);
-  const std::size_t stride =
-      (contact + static_cast<std::size_t>(options.most) - 1) / static_cast<std::size_t>(options.most);
   Errors errors;
   RestWatch rest(world, options);
   std::size_t seen = 0;
@@ -197,8 +195,8 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
     from = tick.device_m;
     const glm::dvec3 reference = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
     rest.see(still[t] > 0, reference);
-    if (options.felt) options.felt(t, reference);
-    if (!tick.soft || seen++ % stride != 0) continue;
+    if (!tick.soft) continue;
+    ++seen;
     errors.add(glm::distance(tick.force_N, reference), jnd_of(tick.force_N, reference, options.floor_N),
                static_cast<double>(t) * options.dt_s, static_cast<double>(still[t]) * options.dt_s);
   }

@@ -4,7 +4,6 @@
 // are compared in ticks in which something soft is in contact.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
@@ -61,7 +60,6 @@ struct ForceError {
 struct SlowRunOptions {
   double dt_s = 1e-3;
   double floor_N = 0.04;  // lower bound of the JND (N)
-  int most = 0;           // greatest number of compared ticks, evenly spread; set it to at least 1
   bool async_relaxation = false;
   std::function<void(const std::string&)> progress;  // may be empty
   int slower = kSlower;                              // slow-down factor; at least 1
@@ -72,16 +70,14 @@ struct SlowRunOptions {
   // (JND) within kRestTicks. From there on it is played as fast as the session. 0: it never counts as at
   // rest.
   double at_rest_jnd = 0.0;
-  // Called for each tick that is played, compared or not, with its number and the slow run's force (N). The
-  // run ends with the last tick in which something soft is in contact. May be empty.
-  std::function<void(std::size_t, const glm::dvec3&)> felt{};
 };
 
 // The options of a reference.
 [[nodiscard]] SlowRunOptions slow_run_options(Reference reference);
 
-// Plays `course` slowly from `state`. `state` must be a session that has just begun at the device's first
-// position.
+// Plays `course` slowly from `state`, and compares every tick in which something soft is in contact: the slow
+// run passes all of them, so the worst instant cannot be missed. `state` must be a session that has just
+// begun at the device's first position.
 ForceError compare_with_slow_run(const World& world, WorldState& state, const ForceCourse& course,
                                  const SlowRunOptions& options);
 

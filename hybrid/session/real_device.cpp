@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "hybrid/session/session.h"
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 
 namespace hybrid {
 namespace {

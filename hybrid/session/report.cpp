@@ -177,6 +177,8 @@ std::string safety_words(const BuiltScene& built) {
   return text;
 }
 
+// An object's force that is this many times the greatest felt force was cut by the limits of the force.
+constexpr double kBeyondFelt = 1.01;
 constexpr std::array kPairKinds{"rigid", "soft", "anchors"};  // ObjectPair::Kind
 
 std::string other_name(const World& world, const ObjectPair& pair) {
@@ -346,7 +348,9 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
                   result.max_force_N);
   text += fmt::format("tick: p50 {:.1f}, p99 {:.1f}, p99.9 {:.1f}, max {:.1f} us\n", tick.p50, tick.p99,
                       tick.p999, tick.max);
+  double most_N = 0.0;
   for (const ObjectRow& row : object_rows(built, result)) {
+    most_N = std::max(most_N, row.max_force_N);
     text += fmt::format("  {:<16} {:<5} {:>9} {:<9} felt in {} ticks, at most {:.3f} N\n", row.name, row.kind,
                         row.kind == "rigid" ? row.triangles : row.voxels,
                         row.kind == "rigid" ? "triangles" : "voxels", row.contact_ticks, row.max_force_N);
@@ -356,6 +360,10 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
                           m.max_force_N);
     }
   }
+  if (most_N > kBeyondFelt * result.max_force_N)
+    text +=
+        "forces by object are those before the limits of the force (soft start, slew, the device's "
+        "maximum)\n";
   text += between_words(*built.world, result.between);
   if (result.contact_ticks == 0) {
     text += "nothing was touched: does the [path] lead to an object? They lie in\n";

@@ -16,7 +16,7 @@
 #include "hybrid/session/pair_presses.h"
 #include "hybrid/session/relaxation_thread.h"
 #include "hybrid/snapshot/fill_snapshot.h"
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/leave_tissue.h"
 #include "hybrid/tick/tissue/work_budget.h"
@@ -395,9 +395,9 @@ Progress keep_going(const Progress& progress) {
 SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOptions& options) {
   const char* not_measured = built.state->soft.empty()                            ? "nothing is soft"
                              : options.realtime || options.real_device != nullptr ? "real time"
-                             : options.reference_samples <= 0 ? "no samples were asked for"
-                             : !options.edits.empty()         ? "values were edited"
-                                                              : nullptr;
+                             : !options.measure_error                             ? "it was not asked for"
+                             : !options.edits.empty()                             ? "values were edited"
+                                                                                  : nullptr;
   if (not_measured != nullptr) {
     SessionResult result = Run(scene, *built.world, *built.state, options, nullptr).run();
     result.error.not_measured = not_measured;
@@ -410,7 +410,6 @@ SessionResult run_session(const Scene& scene, BuiltScene& built, const SessionOp
   SlowRunOptions slow = slow_run_options(options.reference);
   slow.dt_s = result.dt_s;
   slow.floor_N = jnd_floor_N(scene);
-  slow.most = options.reference_samples;
   slow.async_relaxation = options.async_relaxation;
   slow.progress = keep_going(options.progress);
   result.error = compare_with_slow_run(*built.world, *begin, course, slow);

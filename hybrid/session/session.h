@@ -62,9 +62,9 @@ struct SessionOptions {
   // Called kFrames_per_s times a second of the session, by the thread that runs it; not in real time. Must
   // not throw.
   std::function<void(const Snapshot&)> on_frame{};
-  // Greatest number of ticks, evenly spread, whose forces are compared with those of a slow run
+  // Compare the force of each tick in which something soft is in contact with that of a slow run
   // (force_error.h), and how carefully that run is played. In real time nothing is compared.
-  int reference_samples = 0;
+  bool measure_error = false;
   Reference reference = Reference::quick;
   // Clocks, counters and path begin as if this many ticks had passed, so that a soft start is over. The
   // forces do not depend on this number.
@@ -108,8 +108,8 @@ struct SessionResult {
   std::string realtime_note;                 // the priority that was granted, in words
   // How late the machine woke the loop. This is no part of the tick's time.
   Percentiles late_us;
-  // CPU time of the ticks, and of asynchronous relaxation. In real time the latter is that of the relaxation
-  // thread, otherwise that of the work that such a thread would have done.
+  // CPU time of the ticks, and of asynchronous relaxation. In real time a relaxation thread takes the second
+  // one. Otherwise it is the time of the work that such a thread would have done.
   double servo_s = 0.0, relaxation_s = 0.0;
   std::uint64_t async_results = 0;  // asynchronous results that ticks applied
   // Work budget of the contact in real time: the least share in any tick, and the number of ticks with less

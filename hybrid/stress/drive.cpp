@@ -17,16 +17,16 @@
 namespace hybrid {
 namespace {
 
-// Jumps in a run; stays above and below the block in a run; ticks of each stay.
+// Number of jumps in a run, number of stays above and below the block, and ticks of each stay.
 constexpr int kJumps = 300, kThroughs = 30, kTicksThere = 5;
 constexpr double kFar = 1000.0;  // units; a metre if a unit is a millimetre
-// ticks of the way out, and of rest that must follow; most ticks until then
+// Ticks of the way out; tissue must rest for as many ticks afterwards. kMostRest: most ticks until then.
 constexpr int kTicksOut = 100, kMostRest = 4000;
 constexpr std::uint64_t kLookEvery = 16;  // ticks between two measurements of the largest displacement
 constexpr double kAfterPath_s = 0.1;      // ticks go on for this time after the path has ended
-// ticks between two stalls; ticks between two positions that are no numbers
+// Ticks between two stalls, and between two positions that are no numbers.
 constexpr int kStallEvery = 40, kNoNumberEvery = 7;
-// durations of stalled ticks, in turns
+// Durations of stalled ticks, taken in turns.
 constexpr std::array<double, 5> kStalls_s{1e-3, 3e-3, 10e-3, 30e-3, 100e-3};
 
 class Drive {

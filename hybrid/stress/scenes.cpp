@@ -12,7 +12,7 @@
 namespace hybrid {
 namespace {
 
-// of a large block: half of its size (units), and squares along an edge of its mesh
+// Half of the size of a large block (units), and also the number of squares along an edge of its mesh.
 constexpr int kLargeEdge = 512;
 constexpr double kNearlyNothing = 1e-7;  // height of a sliver, as a share of its edge
 

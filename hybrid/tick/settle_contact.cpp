@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "hybrid/tick/proxy/feel_stage.h"
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "hybrid/tick/tissue/press_tissue.h"
 
 namespace hybrid {

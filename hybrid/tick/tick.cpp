@@ -12,7 +12,7 @@
 #include "hybrid/tick/bodies/tissue_supports_bodies.h"
 #include "hybrid/tick/forces_by_object.h"
 #include "hybrid/tick/proxy/feel_stage.h"
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "hybrid/tick/settle_contact.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 #include "hybrid/tick/tissue/obstacles.h"

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kFormat = 2;  // of a record; records of another format are not found
-// of the 64-bit FNV hash
+// First value and factor of the 64-bit FNV hash.
 constexpr std::uint64_t kFnvBegin = 0xCBF29CE484222325ULL, kFnvPrime = 0x100000001B3ULL;
 
 std::uint64_t fnv(std::string_view bytes, std::uint64_t hash = kFnvBegin) {

@@ -25,8 +25,9 @@ std::size_t felt_ticks(const ForceCourse& course);
 // The ticks up to this share of the contact.
 std::uint64_t part_of(const ForceCourse& course, double share);
 
-// The path of `own`, moved by half of the tool's radius along the axis of the scene in which the truth's mean
-// force is least, and so many times faster. `side`: 1 or -1. Its truth is left empty.
+// A motion along the path of `own`, but `speed` times as fast, and moved to one side by half of the tool's
+// radius. The path is moved along the axis of the scene in which the truth's mean force is least, in the
+// direction `side` (1 or -1). The truth of the new motion is empty.
 SearchMotion moved_motion(const SearchMotion& own, const Scene& scene, double side, double speed);
 // Does the moved motion keep at least half of the contact?
 bool stays_in_contact(const SearchMotion& moved, const SearchMotion& own, double speed);

@@ -131,8 +131,8 @@ class Search {
             .dt_s = dt_s()};
   }
 
-  // Sessions with a setting on all motions of the search, `part`: of the first round. The errors are the
-  // worst ones, and all else is of the scene's own path.
+  // Plays a setting on all motions of the search, or, with `part`, on the part of each that the first round
+  // takes. The errors are the worst of all motions. The other figures are those of the scene's own path.
   Evaluation evaluate_all(const Setting& setting, bool part) {
     const auto on = [&](const SearchMotion& m) {
       return evaluate(setting, {m.motion.path, part ? m.part_ticks : m.motion.ticks}, m.words, m.truth, 0);

@@ -30,8 +30,8 @@ struct TunedSetting {
   std::optional<StiffnessMatch> match{};
   std::string left_out;        // why it was not played to the end; empty if it was
   bool whole_session = false;  // played over the whole motion at least once
-  // Against the truth, on the worse of the search's motions; if left out, perhaps over only a part of them.
-  // As in Evaluation.
+  // Errors against the truth, on the worse of the search's motions (Evaluation). The errors of a setting that
+  // was left out may cover only a part of the motions.
   SettingError error, at_soft;
   // Percentiles over the ticks. Each tick does the same work in every pass, so its time is the median over
   // the passes.

@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-// Of the page; all in pixels.
+// Size of the page, and edges of the axes' frame (pixels).
 constexpr double kWidth = 960.0, kHeight = 620.0;
 constexpr double kLeft = 76.0, kRight = 930.0, kTop = 70.0, kBottom = 560.0;
 constexpr double kSmallestMark = 4.0, kLargestMark = 14.0;  // radius

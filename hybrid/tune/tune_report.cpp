@@ -99,7 +99,8 @@ std::string doubt_about_cost(const TuneResult& result) {
   return text;
 }
 
-// A property of the scene that no setting changes, if it can be felt: its voxels are wide for this path.
+// Says that the scene's own voxels are too wide for this path. No setting can change this error. Empty if the
+// error cannot be felt.
 std::string about_scene(const TuneResult& result) {
   const Truth& truth = result.truth;
   if (!truth.spacing || truth.spacing->worst_jnd() < result.bounds.error_jnd) return {};
@@ -118,7 +119,7 @@ bool voxels_left(const Setting& setting) {
 std::string about_proxies(const TuneResult& result) {
   const TunedSetting& chosen = result.settings[result.chosen];
   const bool enough = !voxels_left(chosen.setting) && result.choice.rule == ChoiceRule::cheapest_accurate;
-  const std::string said = enough ? " A proxy is enough here: no voxels are needed." : "";
+  std::string said = enough ? " A proxy is enough here: no voxels are needed." : "";
   if (chosen.match) {
     return fmt::format(
         "{} Its coupling is the tool's, so it is felt at every object. It fits depths up to {:.2f} mm, as on "

@@ -53,7 +53,7 @@ class GlbBuffer {
                           {"type", type}});
     return accessors_.size() - 1;
   }
-  // Of positions glTF wants the bounds.
+  // glTF requires the bounds of positions.
   std::size_t add_positions(const std::vector<glm::vec3>& positions) {
     const std::size_t accessor = add(positions, "VEC3", kFloat, kVertices);
     glm::vec3 low(std::numeric_limits<float>::infinity()), high = -low;

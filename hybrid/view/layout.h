@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The parts of a frame and their places: a heading, the scene below it, and beside the scene a column. The
-// column holds the legend and the nearer view, so that neither covers the scene. Knows no graphics library.
+// column holds the legend and the nearer view, so that neither covers the scene. Uses no graphics library.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,8 @@ struct FrameLayout {
   PixelRect scene;
   PixelRect column;  // on the right; width 0 if the frame is too narrow for a column
   PixelRect key;     // between scene and panel: what the colours of tissue mean; width 0: none
-  // Square; at the lower end of the column, or of the scene if there is a panel; width 0 without a column.
+  // A square at the lower end of the column, or of the scene if there is a panel. Without a column its width
+  // is 0.
   PixelRect inset;
 
   // Pixel of the frame at which a camera shows a point in the scene's rectangle; empty if behind the eye.

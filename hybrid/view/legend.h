@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rows of the legend. Knows no graphics library.
+// The rows of the legend. Uses no graphics library.
 #pragma once
 
 #include <cstddef>

@@ -27,8 +27,8 @@ struct RigidLayer {
   LayerKey key;
 };
 
-// The least value of a series with constant ratio from `least` on that is not below `radius`. So the range of
-// depths takes few values, and a moving tool seldom changes the depths of all else.
+// Rounds `radius` up to the next value of a geometric series that begins with `least`. So the range of depths
+// takes few values, and a moving tool seldom changes the depths of the other objects.
 [[nodiscard]] double rounded_up(double radius, double least);
 
 // a and b of `change = b (depth + a)²`: how much greater the depth (0 to 1) of a point becomes that moves

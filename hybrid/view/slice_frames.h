@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The outlines of slices, by which a user drags them. Knows no graphics library.
+// The outlines of slices, by which a user drags them. Uses no graphics library.
 #pragma once
 
 #include <array>

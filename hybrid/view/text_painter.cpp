@@ -77,10 +77,13 @@ std::vector<std::string> Pen::wrap(const std::string& words, float most) const {
     std::string& line = lines.back();
     if (line.empty()) {
       line = fit(word, most);
-    } else if (width(line + " " + word) <= most) {
-      line += " " + word;
     } else {
-      lines.push_back(fit(word, most));
+      std::string longer = line;
+      longer.append(1, ' ').append(word);
+      if (width(longer) <= most)
+        line = std::move(longer);
+      else
+        lines.push_back(fit(word, most));
     }
     if (end < words.size() && words[end] == '\n') lines.emplace_back();
     at = end + 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a view shows of soft objects besides their surfaces: slices, and the values that colour tissue. Says
-// which displacements it needs, and takes them from snapshots. Knows no graphics library.
+// which displacements it needs, and takes them from snapshots. Uses no graphics library.
 #pragma once
 
 #include <memory>
@@ -52,7 +52,7 @@ class TissueView {
   // The scale of the present colouring. Its end is a round number that never falls, so that colours keep
   // their meaning from frame to frame. A few places of tissue may have a larger strain.
   [[nodiscard]] ColourScale scale() const;
-  // As Scans::in_words().
+  // The progress of reading the scans (Scans::in_words()), or empty if no grey values are shown.
   [[nodiscard]] std::string in_words() const { return view_.grey ? scans_.in_words() : std::string(); }
 
  private:

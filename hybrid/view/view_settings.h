@@ -24,8 +24,8 @@ struct ClipPlane {
   bool other_side = false;  // the part before the plane is left out instead
 };
 
-// A plane through all soft objects, perpendicular to an axis. The tissue in it at rest is drawn where it is
-// now.
+// A plane through all soft objects, perpendicular to an axis. The plane cuts the tissue at rest. The
+// tissue on the cut is drawn at its present place.
 struct SlicePlane {
   bool on = false;
   double share = 0.5;  // place along the axis within SoftBox, 0 to 1

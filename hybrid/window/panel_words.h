@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Words of the panel. Knows no graphics library.
+// Words of the panel. Uses no graphics library.
 #pragma once
 
 #include <string>

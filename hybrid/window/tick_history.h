@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The ticks of the last seconds, for the window's charts. A pixel column stands for many ticks. It gets the
-// least and the largest force among them, so that no spike is lost. Knows no graphics library.
+// least and the largest force among them, so that no spike is lost. Uses no graphics library.
 #pragma once
 
 #include <array>
@@ -65,7 +65,7 @@ class TickHistory {
   [[nodiscard]] double most_N() const;                    // of all series
   [[nodiscard]] double most_N(ForceSeries series, double from_s, double to_s) const;
   [[nodiscard]] TickTimes times() const;
-  // Of the ticks from `from_s` on and before `to_s`.
+  // The times of the ticks from `from_s` on and before `to_s`.
   [[nodiscard]] TickTimes times(double from_s, double to_s) const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Input of pointer and keyboard in one frame, for the panels. Knows no graphics library.
+// Input of pointer and keyboard in one frame, for the panels. Uses no graphics library.
 #pragma once
 
 #include <array>

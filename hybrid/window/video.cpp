@@ -45,6 +45,7 @@ std::vector<std::string> words_of(const FilePlace& place, int width, int height,
 // Starts ffmpeg with the reading end of the pipe as its standard input. Returns an error number, or 0.
 int start(const std::vector<std::string>& words, int input, pid_t& process) {
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A script acts as the user of a window, for tutorials and tests: keys, clicks, edits and views at given
-// times. Knows no graphics library.
+// times. Uses no graphics library.
 #pragma once
 
 #include <span>

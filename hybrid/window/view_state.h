@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The choices of a window's user, and the actions that change them. Buttons, keys and scripts all become
-// actions. Knows no graphics library.
+// actions. Uses no graphics library.
 #pragma once
 
 #include <cstdint>

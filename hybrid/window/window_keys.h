@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The window's keys: their names in scripts, and their actions. Knows no graphics library.
+// The window's keys: their names in scripts, and their actions. Uses no graphics library.
 #pragma once
 
 #include <optional>

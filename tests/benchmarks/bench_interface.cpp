@@ -44,7 +44,7 @@ void must(hybrid_code code) {
   if (code != HYBRID_OK) throw std::runtime_error(hybrid_error_text());
 }
 
-// Into the ball, from another place in each round.
+// A path into the ball. Each round begins at another place.
 std::vector<glm::dvec3> path_of(int round) {
   std::vector<glm::dvec3> path_m;
   const glm::dvec3 from(1e-4 * round, 0.0, 0.04), to(0.0, 0.0, 0.019);

@@ -80,7 +80,7 @@ const std::vector<SessionCall>& session_calls() {
       {"hybrid_state_hash", [](auto* s) { return hybrid_state_hash(s, &hash); }, true},
       {"hybrid_publish", [](auto* s) { return hybrid_publish(s); }, true},
       {"hybrid_save_recording", [](auto* s) { return hybrid_save_recording(s, "/nowhere/a.rec"); }, true},
-      {"hybrid_measure_error", [](auto* s) { return hybrid_measure_error(s, 1, &error); }, true},
+      {"hybrid_measure_error", [](auto* s) { return hybrid_measure_error(s, &error); }, true},
       {"hybrid_begin", [](auto* s) { return hybrid_begin(s, at_m); }, false},
       {"hybrid_close", [](auto* s) { return hybrid_close(s); }, false},
   };
@@ -235,9 +235,8 @@ TEST_F(CMisuse, WhatASessionWasNotOpenedForIsRefused) {
   expect_refusal(hybrid_take_snapshot(plain.get(), &snapshot), HYBRID_NOT_AVAILABLE, "hybrid_take_snapshot");
   expect_refusal(hybrid_save_recording(plain.get(), (folder_ / "a.rec").c_str()), HYBRID_NOT_AVAILABLE,
                  "hybrid_save_recording", "recorded_ticks");
-  expect_refusal(hybrid_measure_error(plain.get(), 10, &error), HYBRID_NOT_AVAILABLE, "hybrid_measure_error",
+  expect_refusal(hybrid_measure_error(plain.get(), &error), HYBRID_NOT_AVAILABLE, "hybrid_measure_error",
                  "with_error");
-  expect_refusal(hybrid_measure_error(plain.get(), 0, &error), HYBRID_BAD_VALUE, "hybrid_measure_error");
 
   const CSession recorded(scene(), {.recorded_ticks = 2});
   recorded.begin({0.0, 0.0, 0.02});

@@ -36,11 +36,11 @@ bool same_bits(const double (&a)[3], const glm::dvec3& b) {
 
 // A session as `hybrid run` has it, in fixed steps.
 struct Reference {
-  explicit Reference(const std::filesystem::path& file, bool asynchronous = true, int samples = 0)
+  explicit Reference(const std::filesystem::path& file, bool asynchronous = true, bool measure_error = false)
       : scene(hybrid::load_scene(file)), built(hybrid::build_scene(scene)) {
     hybrid::SessionOptions options;
     options.async_relaxation = asynchronous;
-    options.reference_samples = samples;
+    options.measure_error = measure_error;
     result = hybrid::run_session(scene, built, options);
     for (const hybrid::RecordedTick& tick : result.recording) path_m.push_back(tick.device_m);
   }
@@ -224,13 +224,13 @@ TEST_F(CSessionFile, ASceneGivenAsTextIsThatOfTheFileAndItsRecordingReplays) {
 // ---- the error ----
 
 TEST_F(CSessionFile, TheErrorIsThatOfTheProgram) {
-  const Reference reference(scene(), true, 40);
+  const Reference reference(scene(), true, true);
   ASSERT_GT(reference.result.error.all.samples, 0);
   const CSession session(scene(), {.recorded_ticks = reference.path_m.size(), .with_error = 1});
   session.begin(reference.result.start_m);
   (void)session.play(reference.path_m);
   hybrid_error error{.size = sizeof error};
-  expect_ok(hybrid_measure_error(session.get(), 40, &error));
+  expect_ok(hybrid_measure_error(session.get(), &error));
   EXPECT_EQ(error.samples, static_cast<std::uint32_t>(reference.result.error.all.samples));
   EXPECT_EQ(error.max_N, reference.result.error.all.max_N);
   EXPECT_EQ(error.p99_jnd, reference.result.error.p99_jnd);

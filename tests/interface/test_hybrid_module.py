@@ -108,7 +108,7 @@ class Values(unittest.TestCase):
     def test_the_error_is_measured(self):
         with hybrid.Session.from_text(BLOCK, record=300, error=True) as session:
             session.play(SOFT_PRESS)
-            error = session.measure_error(20)
+            error = session.measure_error()
         self.assertGreater(error.samples, 0)
         self.assertGreaterEqual(error.max_jnd, error.p99_jnd)
 

@@ -21,7 +21,8 @@ constexpr double sign_at(std::size_t parity, std::size_t corner) {
   return sign;
 }
 
-// Sums and differences of all pairs along y and z. Along x the caller has formed them, or forms them next.
+// Replaces each pair of corners along y and along z by its sum and difference. The caller does the same along
+// x, before or after.
 HYBRID_INLINE void transform_across(Float8 (&m)[kCorners]) {
 #pragma GCC unroll 2
   for (int bit = 2; bit <= 4; bit *= 2) {

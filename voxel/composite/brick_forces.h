@@ -55,17 +55,18 @@ struct BrickView {
   std::size_t stride, plane;  // to the next node along y, along z
 };
 inline constexpr float kNewStrain = 1e30F;  // strain of a cell that takes the present strain at once
-// Forces of bricks at the displacements u.
+// Adds the forces of bricks at the displacements u.
 void add_brick_forces(const BrickView& view, const BrickBlocks& blocks) noexcept;
-// Forces of bricks less their links, with strains that follow those of u. strains: [strain] by cell.
+// Adds the forces of bricks minus those of their links. `strains`, [strain] by cell, are the strains that the
+// forces belong to. They follow the strains of the displacements u.
 void add_deferred_forces(const BrickView& view, const DeferredBrick& brick,
                          const std::array<float*, DeferredBrick::kStrains>& strains) noexcept;
 
-// The bricks of an object: of a cell between voxels of the reference, less its links, in parts and as a
-// whole.
+// The brick of a cell between voxels of the reference material. The links of the cell carry a part of its
+// stiffness, which is subtracted here.
 struct Bricks {
-  DeferredBrick deferred;
-  BrickBlocks less_links;
+  DeferredBrick deferred;                            // in parts
+  BrickBlocks less_links;                            // as a whole
   mutable std::array<std::vector<float>, 3> forces;  // [axis] scratch
 };
 

@@ -138,7 +138,7 @@ void CompositeGrid::find_brick_moduli(Level& level) noexcept {
   });
 }
 
-// Without forces of cells that the finer patch covers.
+// The view leaves out the forces of cells that the finer patch covers.
 composite::BrickView CompositeGrid::brick_view(std::size_t l) const noexcept {
   const Level& level = levels_[l];
   composite::BrickView v{};

@@ -284,11 +284,11 @@ HYBRID_MULTIVERSIONED double force_of_bounds(const LevelView& v, const std::arra
         Float8 force{};
         if (v.lower != nullptr) {
           load(x, v.lower + at);
-          force = (u <= x) & (pull < zero) ? -pull : force;
+          force = ((u <= x) & (pull < zero)) ? -pull : force;
         }
         if (v.negated_upper != nullptr) {
           load(x, v.negated_upper + at);
-          force = (u >= -x) & (pull > zero) ? -pull : force;
+          force = ((u >= -x) & (pull > zero)) ? -pull : force;
         }
         load(x, v.inverse_diagonal + at);
         force = x > zero ? force : zero;

@@ -118,7 +118,7 @@ struct GridLevel {
     return {static_cast<int>(number % stride), static_cast<int>(number % plane / stride),
             static_cast<int>(number / plane)};
   }
-  // From a node to the next one along d.
+  // Distance in memory from a node to the next one along d (values).
   [[nodiscard]] std::size_t stride_along(std::size_t d) const { return d == 0 ? 1 : d == 1 ? stride : plane; }
   [[nodiscard]] int at(std::size_t d, int i) const { return nodes[d].begin + step * i; }
 };

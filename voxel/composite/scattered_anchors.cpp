@@ -10,8 +10,6 @@
 namespace voxel {
 namespace {
 
-using composite::index;
-
 // Least resistance of a face, relative to a link between voxels. Faces in their node's plane have it.
 constexpr float kLeastResistance = 0.01F;
 

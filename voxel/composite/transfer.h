@@ -23,7 +23,7 @@ struct ProlongArgs {
   std::array<float, 4> weights;
   int count = 0;
   bool odd = false;  // lane 0 is between two coarse lanes
-  // By fine lane: weight of the coarse lane after it.
+  // lane_weight: for each fine lane, the weight of the coarse lane after it.
   const float *lane_weight, *lower, *negated_upper, *is_free;  // bounds null: none
   float* u;
   int vectors;

@@ -75,7 +75,7 @@ struct VoxelSprings {
   std::array<Spring, 3> up, down;
   std::array<float, 3> inverse{};
 
-  // For movable voxels only.
+  // Call it for movable voxels only: the springs of others may add up to 0.
   void set_inverse() noexcept {
     for (int axis = 0; axis < 3; ++axis) {
       float sum = 0.0F;

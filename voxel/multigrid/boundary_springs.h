@@ -78,10 +78,10 @@ class BoundarySprings {
 
  private:
   using Through = std::array<std::array<float, 3>, 3>;  // [axis][d] stiffness through links along d (N/m)
-  // The springs that anchors add to one cell, without zeros. On levels finer than LevelStiffness::kKept,
-  // springs of anchors are found when their row is first read, because the springs of all rows would take
-  // much memory. From level kKept on it would take long to find those of a row. So there they are found on
-  // construction, and each cell with such springs has a record.
+  // The springs that anchors add to one cell, without zeros. Only levels from LevelStiffness::kKept on have
+  // records. Their springs are found on construction, because finding them row by row would take long. The
+  // springs of finer levels are found when their row is first read, because all of them would take much
+  // memory.
   struct Record {
     VoxelId cell;
     std::uint32_t first;  // index of its first value in Level::values

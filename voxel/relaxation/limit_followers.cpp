@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Search for followers by rows, and their local equilibria.
+// Finds the followers row by row, and moves each to its local equilibrium.
 #include "voxel/relaxation/limit_followers.h"
 
 #include <algorithm>

@@ -12,8 +12,8 @@ constexpr int kContactSweeps = 4;   // replaces kCoarsestSweeps under asynchrono
 // Levels of a contact cycle under asynchronous relaxation. The shadow relaxes tissue further away. If contact
 // cycles moved the coarsest cells, too, contact cycles and the shadow's cycles would disturb one another.
 constexpr int kContactLevels = 5;
-// Cost of smoothing and of restricting a Float8 of cells (unit: Float8 prolonged). kOfVoxels: factor for
-// voxels, which have limits and obstacles.
+// What a Float8 of cells costs (unit: the prolongation of a Float8): to smooth it kSmoothed, to restrict it
+// kPassedOn. A Float8 of voxels costs kOfVoxels times as much, because voxels have limits and obstacles.
 constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
 // Further cycles on the coarse levels alone before voxels get the correction. Each costs an eighth of a whole
 // cycle.
@@ -78,8 +78,8 @@ void Relaxation::lay_boxes(const std::array<int, 3>& low, const std::array<int, 
     if (l == last) break;
     const RowBox p{s.q0 / 2, s.q1 / 2, s.j0 / 2, s.j1 / 2, s.k0 / 2, s.k1 / 2};
     boxes(l + 1).parents = p;
-    // These cells and the cells beside them prolong to all of their children, and to the children beside
-    // those.
+    // The parents and the cells beside the parents prolong to all of their children, and to one more child on
+    // each side.
     boxes(l + 1).source_cells = clipped(l + 1, {p.q0 - 1, p.q1 + 1, p.j0 - 1, p.j1 + 1, p.k0 - 1, p.k1 + 1});
     const RowBox& t = boxes(l + 1).source_cells;
     RowBox& prolonged = boxes(l).prolonged;

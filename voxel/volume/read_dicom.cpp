@@ -299,6 +299,7 @@ std::unique_ptr<SharedMemory> read_dicom_voxels(const fs::path& folder, const Di
   std::map<fs::path, std::vector<std::size_t>> slices_of;  // each file is read once
   for (std::size_t k = 0; k < series.slices.size(); ++k) slices_of[series.slices[k].path].push_back(k);
   std::vector<fs::path> files;
+  files.reserve(slices_of.size());
   for (const auto& [file, slices] : slices_of) files.push_back(file);
   const SharedMemory states(files.size() * sizeof(SharedFile));
   auto memory = std::make_unique<SharedMemory>(data.header.bytes);

@@ -29,8 +29,9 @@ std::size_t sum_of(const std::vector<std::size_t>& values, std::size_t count) {
   return std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count), std::size_t{0});
 }
 
-// Share of all choices of `chosen` ranks whose sum is at least as far from its mean as `sum`. Choices are
-// counted by their size and sum, one rank after another. There are fewer than 2^53 of them.
+// All choices of `chosen` of the ranks are equally likely. Returns the share of the choices whose sum is at
+// least as far from the mean sum as `sum`. Choices of the same size and sum are counted together. There are
+// fewer than 2^53 choices.
 double exact_p(const std::vector<std::size_t>& ranks, std::size_t chosen, std::size_t sum) {
   const std::size_t total = sum_of(ranks, ranks.size());
   std::vector<std::vector<double>> ways(chosen + 1, std::vector<double>(total + 1, 0.0));
@@ -40,7 +41,7 @@ double exact_p(const std::vector<std::size_t>& ranks, std::size_t chosen, std::s
       for (std::size_t s = total; s >= ranks[seen]; --s) ways[count][s] += ways[count - 1][s - ranks[seen]];
     }
   }
-  // All is multiplied by the number of ranks, so that the mean is a whole number.
+  // Sum and mean are both multiplied by the number of ranks, so that the mean is a whole number.
   const auto distance = [&](std::size_t s) {
     const std::size_t at = s * ranks.size(), mean = total * chosen;
     return at > mean ? at - mean : mean - at;

@@ -14,7 +14,6 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr int kEveryTick = 1'000'000;  // compared ticks: all
 constexpr const char* kVoxelByVoxel = "voxel by voxel";
 
 glm::dvec3 extent_of(const RigidObject& object) {
@@ -110,7 +109,7 @@ void play(const Variant& variant, const Motion& motion, bool timed, const Progre
     options.seconds = static_cast<double>(motion.ticks) / variant.scene.rate_hz;
     options.keep_recording = false;
     options.keep_rows = !timed;
-    options.reference_samples = timed ? 0 : kEveryTick;
+    options.measure_error = !timed;
     options.async_relaxation = true;
     options.path = motion.path;
     options.progress = progress;
@@ -138,6 +137,7 @@ void play(const Variant& variant, const Motion& motion, bool timed, const Progre
 
 OverRepeats over(const std::vector<Percentiles>& repeats, double Percentiles::*which) {
   std::vector<double> values;
+  values.reserve(repeats.size());
   for (const Percentiles& p : repeats) values.push_back(p.*which);
   std::ranges::sort(values);
   return {values[values.size() / 2], values.front(), values.back()};

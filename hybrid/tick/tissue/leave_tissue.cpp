@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "polygon/surface/rigid_surface.h"
 
 namespace hybrid {

@@ -150,7 +150,8 @@ bool may_press(const World& world, WorldState& state, const FacetContact& pair) 
 void update_contacts(const World& world, WorldState& state) noexcept {
   for (std::size_t i = 0; i < state.facet_contacts.size();) {
     FacetContact& pair = state.facet_contacts[i];
-    // Most contacts are near but do not press. Searching their facets would cost as much as all else.
+    // Most contacts are near but do not press. Searching their facets would cost as much as the rest of the
+    // tick.
     if ((i + state.tick) % kFarContactTurns != 0 && !may_press(world, state, pair)) {
       ++i;
       continue;

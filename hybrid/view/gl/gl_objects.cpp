@@ -113,7 +113,8 @@ void delete_program(GLuint program) {
 }
 
 const void* buffer_offset(std::size_t bytes) {
-  return reinterpret_cast<const void*>(bytes);  // OpenGL takes an offset as a pointer
+  // OpenGL takes an offset as a pointer.
+  return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr)
 }
 
 GLuint make_image(int width, int height, std::span<const VertexColour> pixels) {

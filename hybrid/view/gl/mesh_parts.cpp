@@ -89,8 +89,8 @@ std::array<glm::vec4, 6> planes_of_view(const glm::mat4& clip_from_mesh) {
   std::array<glm::vec4, 6> planes{};
   for (int axis = 0; axis < 3; ++axis) {
     const glm::vec4 w = glm::row(clip_from_mesh, 3), along = glm::row(clip_from_mesh, axis);
-    planes[static_cast<std::size_t>(2 * axis)] = w + along;
-    planes[static_cast<std::size_t>(2 * axis + 1)] = w - along;
+    planes[2 * static_cast<std::size_t>(axis)] = w + along;
+    planes[2 * static_cast<std::size_t>(axis) + 1] = w - along;
   }
   for (glm::vec4& plane : planes)
     plane /= std::max(glm::length(glm::vec3(plane)), std::numeric_limits<float>::min());

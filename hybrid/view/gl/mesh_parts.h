@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Leaves out the triangles of a mesh that a view cannot show. The mesh is divided into parts of neighbouring
-// triangles, and a part outside the view is not drawn. Knows no graphics library.
+// triangles, and a part outside the view is not drawn. Uses no graphics library.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Meshes in the layout of the graphics card: floats relative to an origin, with normals. Knows no graphics
+// Meshes in the layout of the graphics card: floats relative to an origin, with normals. Uses no graphics
 // library.
 #pragma once
 

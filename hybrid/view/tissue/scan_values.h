@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The grey values of the scans that soft objects were made from. A session does not keep them: they are read
-// when a view first asks for them, on a thread of their own. Knows no graphics library.
+// when a view first asks for them, on a thread of their own. Uses no graphics library.
 #pragma once
 
 #include <future>

@@ -50,7 +50,9 @@ class NetBuilder {
     std::optional<glm::dvec3> nearest;
     for (int y = std::max(low, 0); y < std::min(high, section_.height); ++y) {
       for (int x = std::max(left, 0); x < std::min(right, section_.width); ++x) {
-        if (section_.materials[static_cast<std::size_t>(y * section_.width + x)] == 0) continue;
+        if (section_.materials[static_cast<std::size_t>(y) * static_cast<std::size_t>(section_.width) +
+                               static_cast<std::size_t>(x)] == 0)
+          continue;
         const glm::dvec2 way = glm::dvec2(x, y) - place;
         if (const double squared = glm::dot(way, way); squared < least) {
           least = squared;
@@ -62,7 +64,8 @@ class NetBuilder {
   }
 
   std::uint32_t node(int i, int j, int columns) {
-    std::uint32_t& number = number_[static_cast<std::size_t>(j * (columns + 1) + i)];
+    std::uint32_t& number = number_[static_cast<std::size_t>(j) * static_cast<std::size_t>(columns + 1) +
+                                    static_cast<std::size_t>(i)];
     if (number != kNone) return number;
     number = static_cast<std::uint32_t>(section_.nodes_m.size());
     const int x = i * per_cell_, y = j * per_cell_;

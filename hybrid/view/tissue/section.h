@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Plane sections of a soft object. The plane is at rest, and the section moves with the tissue. Knows no
+// Plane sections of a soft object. The plane is at rest, and the section moves with the tissue. Uses no
 // graphics library.
 #pragma once
 

@@ -65,7 +65,7 @@ double largest_eigenvalue(const glm::dmat3& a) {
   return std::abs(high) >= std::abs(low) ? high : low;
 }
 
-// Share of a limit; a difference against a limit of 0 counts as the whole limit.
+// The difference as a share of the limit, at most 1. If the limit is 0, any difference is the whole share.
 float share_of(float difference_m, float limit_m, float rounding_m) {
   if (!(difference_m > rounding_m)) return 0.0F;
   return limit_m > rounding_m ? std::min(difference_m / limit_m, 1.0F) : 1.0F;
@@ -134,8 +134,8 @@ std::vector<float> TissueField::values(TissueColour colour, std::span<const glm:
 float TissueField::strain_at(const Stencil& stencil, std::span<const glm::vec3> moved_m) const {
   glm::dmat3 gradient(0.0);  // [d] derivative of the displacement (object's axes) along axis d
   for (int d = 0; d < 3; ++d) {
-    const std::uint32_t up = stencil.ends[static_cast<std::size_t>(2 * d)],
-                        down = stencil.ends[static_cast<std::size_t>(2 * d + 1)];
+    const std::uint32_t up = stencil.ends[2 * static_cast<std::size_t>(d)],
+                        down = stencil.ends[2 * static_cast<std::size_t>(d) + 1];
     const int links = (up != kNone ? 1 : 0) + (down != kNone ? 1 : 0);
     if (links == 0) continue;
     const glm::vec3 difference =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A quantity of a soft object, from the displacements of its voxels: strain, or how near links are to their
-// limits. Knows no graphics library.
+// limits. Uses no graphics library.
 #pragma once
 
 #include <array>

@@ -68,7 +68,7 @@ double of_twice_the_stiffness(double force_N, double power) {
 
 TEST_F(CompareScenes, ASceneCannotBeToldFromItself) {
   const auto one = gel("a.toml", "8000", "2");
-  const ScenesComparison c = hybrid::compare_scenes(std::vector{one, one}, 1000, {});
+  const ScenesComparison c = hybrid::compare_scenes(std::vector{one, one}, true, {});
   ASSERT_EQ(c.scenes.size(), 2U);
   EXPECT_NE(c.scenes[0].name, c.scenes[1].name);
   EXPECT_TRUE(c.notes.empty());
@@ -87,7 +87,7 @@ TEST_F(CompareScenes, ASceneCannotBeToldFromItself) {
 
 TEST_F(CompareScenes, TwiceTheModulusIsFeltAsElasticitySays) {
   const std::vector scenes{gel("soft.toml", "8000", "2"), gel("stiff.toml", "16000", "2")};
-  const ScenesComparison c = hybrid::compare_scenes(scenes, 0, {});
+  const ScenesComparison c = hybrid::compare_scenes(scenes, false, {});
   const double soft_N = held_N(c.scenes[0]), stiff_N = held_N(c.scenes[1]);
   ASSERT_GT(soft_N, 0.1);
   // The force lies between that of a flat contact (power 1) and of one that stiffens more than Hertz's (power
@@ -106,7 +106,7 @@ TEST_F(CompareScenes, TwiceTheModulusIsFeltAsElasticitySays) {
 
 TEST_F(CompareScenes, HalfTheSpacingIsEightTimesTheVoxelsAndAboutTheForce) {
   const std::vector scenes{gel("coarse.toml", "8000", "2"), gel("fine.toml", "8000", "1")};
-  const ScenesComparison c = hybrid::compare_scenes(scenes, 0, {});
+  const ScenesComparison c = hybrid::compare_scenes(scenes, false, {});
   EXPECT_EQ(c.scenes[1].soft_voxels, 8 * c.scenes[0].soft_voxels);
   EXPECT_GT(c.scenes[1].memory_bytes, c.scenes[0].memory_bytes);
   const double coarse_N = held_N(c.scenes[0]), fine_N = held_N(c.scenes[1]);
@@ -117,7 +117,7 @@ TEST_F(CompareScenes, HalfTheSpacingIsEightTimesTheVoxelsAndAboutTheForce) {
 
 TEST_F(CompareScenes, ALowerSurfaceIsFeltLaterByTheTimeToGetThere) {
   const std::vector scenes{ball("high.toml", "20"), ball("low.toml", "19")};
-  const ScenesComparison c = hybrid::compare_scenes(scenes, 1000, {});
+  const ScenesComparison c = hybrid::compare_scenes(scenes, true, {});
   ASSERT_TRUE(c.scenes[1].onset_later_s.has_value());
   EXPECT_NEAR(*c.scenes[1].onset_later_s, 1e-3 / 0.05,
               1.01e-3);  // the time for 1 mm at 50 mm/s, within a tick
@@ -130,7 +130,7 @@ TEST_F(CompareScenes, AnotherToolIsRefusedAndAnotherPathIsSaid) {
   const auto one = gel("a.toml", "8000", "2");
   const auto refusal = [&](const hybrid::Scene& other) -> std::string {
     try {
-      (void)hybrid::compare_scenes(std::vector{one, other}, 0, {});
+      (void)hybrid::compare_scenes(std::vector{one, other}, false, {});
     } catch (const std::runtime_error& error) {
       return error.what();
     }
@@ -145,7 +145,7 @@ TEST_F(CompareScenes, AnotherToolIsRefusedAndAnotherPathIsSaid) {
   EXPECT_THAT(refusal(faster), HasSubstr("2000 Hz"));
 
   try {
-    (void)hybrid::compare_scenes(std::vector{ball("small.toml", "20"), ball("large.toml", "40")}, 0, {});
+    (void)hybrid::compare_scenes(std::vector{ball("small.toml", "20"), ball("large.toml", "40")}, false, {});
     ADD_FAILURE() << "the path of the first begins inside the second's ball";
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), HasSubstr("large.toml"));
@@ -153,7 +153,7 @@ TEST_F(CompareScenes, AnotherToolIsRefusedAndAnotherPathIsSaid) {
   }
 
   const auto deeper = gel("deeper.toml", "8000", "2", "shape = \"ball\"\nradius = 4\n", "[0, 0, 5]");
-  const ScenesComparison c = hybrid::compare_scenes(std::vector{one, deeper}, 0, {});
+  const ScenesComparison c = hybrid::compare_scenes(std::vector{one, deeper}, false, {});
   ASSERT_EQ(c.notes.size(), 1U);
   EXPECT_THAT(c.notes.front(), HasSubstr("deeper has another path"));
   EXPECT_EQ(c.scenes[1].all.max_jnd, 0.0);  // both scenes play the path of the first

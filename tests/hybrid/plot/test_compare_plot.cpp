@@ -77,6 +77,9 @@ TEST(ComparePlot, GivesEachModelPanelsOfItsOwn) {
   EXPECT_EQ(count(svg, ">mesh and proxy: difference from voxels<"), 1U);
   EXPECT_EQ(count(svg, ">nearest-surface: difference from voxels<"), 1U);
   EXPECT_EQ(count(svg, ">difference (JND)<"), 2U);
+  EXPECT_EQ(count(svg, ">mesh and proxy: force over depth<"), 1U)
+      << "15 times the force would flatten the others";
+  EXPECT_EQ(count(svg, ">nearest-surface: force over depth<"), 0U);
 }
 
 // With a JND of 0.14 N, 30 N instead of 2 N are 200 JND, and 2.1 N are 0.71 JND. Both axes have ticks at 1

@@ -47,7 +47,7 @@ const std::vector<std::string> kBlock{"block"};
 
 TEST_F(Tune, AnErrorIsWhatCompareSaysOfTheTwoFiles) {
   const std::vector scenes{hybrid::load_scene(gel("a.toml", "2")), hybrid::load_scene(gel("b.toml", "3"))};
-  const auto compared = hybrid::compare_scenes(scenes, 0, {}).scenes[1];
+  const auto compared = hybrid::compare_scenes(scenes, false, {}).scenes[1];
   const Scene a = hybrid::on_ideal_device(scenes[0]), b = hybrid::on_ideal_device(scenes[1]);
   const Motion motion = hybrid::scene_motion(a);
   const auto reference = hybrid::play_setting(a, kBlock, motion, {}).course;

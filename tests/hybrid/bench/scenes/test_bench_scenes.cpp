@@ -64,7 +64,7 @@ TEST_F(BenchScenes, RowsOfASoftBlock) {
   const hybrid::Scene scene = hybrid::on_ideal_device(hybrid::load_scene(file));
   hybrid::BuiltScene built = hybrid::build_scene(scene);
   hybrid::SessionOptions options;
-  options.reference_samples = 1'000'000;
+  options.measure_error = true;
   options.async_relaxation = true;
   const auto played = hybrid::run_session(scene, built, options);
   EXPECT_GT(played.error.all.samples, 0);

@@ -10,8 +10,8 @@
 #include <tuple>
 
 #include "hybrid/base/flush_to_zero.h"
-#include "hybrid/tick/proxy/proxy_step.h"
 #include "hybrid/tick/proxy/proxy_sweep.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 #include "polygon/surface/mesh_surface.h"
 #include "polygon/surface/primitives.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tables of objects, [[rigid]] and [[soft]], of a scene file. read_soft() is in read_soft.cpp, all else
-// in read_rigid.cpp.
+// The tables of objects, [[rigid]] and [[soft]], of a scene file. read_soft() is in read_soft.cpp, the
+// other functions are in read_rigid.cpp.
 #pragma once
 
 #include <optional>

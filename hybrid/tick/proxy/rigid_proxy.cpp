@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/tick/proxy/proxy_step.h"
+#include "hybrid/tick/proxy/rigid_proxy.h"
 
 #include <algorithm>
 #include <glm/common.hpp>
@@ -112,8 +112,7 @@ bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device
   return false;
 }
 
-RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& device_m,
-                     double /*dt_s*/) noexcept {
+RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept {
   RigidStep step;
   step.free = advance_through_free_space(world, state, device_m, 0.0);
   if (step.free) {

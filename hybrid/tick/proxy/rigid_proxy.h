@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Further steps of the proxy among rigid objects: through free space, at the start of a session, and the
-// rigid part of a tick alone.
+// Moves the proxy among rigid objects: to a place outside them when a session starts, through free space, and
+// in the rigid part of a tick alone. The proxy is never inside a rigid object. proxy_sweep.h moves it in
+// contact.
 #pragma once
 
 #include "hybrid/tick/proxy/proxy_sweep.h"
@@ -28,6 +29,6 @@ struct RigidStep {
   bool arrived = true;                    // false: a bound on the steps ended the sweep
   std::uint32_t steps = 0, surveys = 0;
 };
-RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& device_m, double dt_s) noexcept;
+RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept;
 
 }  // namespace hybrid
