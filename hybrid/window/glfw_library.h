@@ -9,6 +9,11 @@ namespace hybrid {
 // The reason of the library's last error.
 std::string glfw_reason();
 
+// Why the window is lost, in words; empty: it is there. After that no call may use the window.
+std::string why_window_is_lost();
+// Is the connection to the display broken? Then even closing the window would wait for an answer.
+bool display_is_gone();
+
 struct GlfwLibrary {
   // Throws std::runtime_error with the remedy if there is no display.
   GlfwLibrary();

@@ -25,7 +25,9 @@ namespace hybrid {
 namespace {
 
 struct CloseWindow {
-  void operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
+  void operator()(GLFWwindow* window) const {
+    if (!display_is_gone()) glfwDestroyWindow(window);
+  }
 };
 
 enum class Drag { none, orbit, pan, tool, slice, object };
@@ -374,6 +376,7 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   State& s = *state_;
   GLFWwindow* const handle = s.window.get();
   glfwPollEvents();
+  if (const std::string why = why_window_is_lost(); !why.empty()) throw std::runtime_error(why);
   s.play_events();
   if (s.user.quit || glfwWindowShouldClose(handle) == GLFW_TRUE) return false;
   s.device_m = snapshot.device_m;

@@ -64,7 +64,7 @@ class Window {
   [[nodiscard]] const DrawnScene& scene() const;
 
   // Shows a snapshot and handles the input since the last call. Waits for the display's refresh. Returns
-  // false if the user closed the window. Throws std::runtime_error if the driver fails.
+  // false if the user closed the window. Throws std::runtime_error if the driver fails or the window is lost.
   bool frame(const Snapshot& snapshot, const SessionNotes& notes = {});
 
   // Adds every tick since the last frame, for the charts.
