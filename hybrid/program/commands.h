@@ -164,6 +164,7 @@ struct ViewCommand {
   std::filesystem::path scene;
   std::optional<std::uint64_t>
       frames;  // number of frames before the window closes; each is written to `out` if that is given
+  int width = 1280, height = 960;  // of the window (screen units; pixels on most displays)
   std::filesystem::path out;
   std::filesystem::path video;   // the frames as a video; empty: none
   std::filesystem::path drag;    // CSV of positions (t, x, y, z) that replace the mouse

@@ -367,6 +367,8 @@ void add_view(CLI::App& app, int& status) {
   sub->add_option("--frames", c->frames, "close after this many frames")->check(CLI::PositiveNumber);
   sub->add_option("--out", c->out, "write each frame as PNG into this folder");
   sub->add_option("--video", c->video, "write the frames as a video (.mp4, .mkv, .webm; needs ffmpeg)");
+  sub->add_option("--width", c->width, "width of the window (pixels)")->check(CLI::Range(64, 8192));
+  sub->add_option("--height", c->height, "height of the window (pixels)")->check(CLI::Range(64, 8192));
   add_device(*sub, c->device);
   sub->add_option("--drag", c->drag, "drag the tool along a CSV (t_s, x_m, y_m, z_m) instead of the mouse");
   sub->add_option("--script", c->script, "play keys, clicks and edits from this text file");

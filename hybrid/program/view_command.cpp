@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "device/loop/stop_signal.h"
+#include "hybrid/base/thread_time.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
@@ -15,6 +16,7 @@
 #include "hybrid/session/live_session.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/window/frame_meter.h"
+#include "hybrid/window/glfw_library.h"
 #include "hybrid/window/video.h"
 #include "hybrid/window/view_script.h"
 #include "hybrid/window/window.h"
@@ -56,14 +58,16 @@ std::string changes_between(const ViewedScene& before, const ViewedScene& after)
   return fmt::format("{}", fmt::join(after.changes.begin() + since, after.changes.end(), ", "));
 }
 
-// Shows the scene in which the session goes on, and drops the one before.
-void show_changed(Window& window, std::unique_ptr<ViewedScene>& viewed, std::unique_ptr<ViewedScene> next,
-                  ChangeEffect& effect) {
-  effect.words = changes_between(*viewed, *next);
+// Shows the scene in which the session goes on. The one before is kept until the forces of both are compared.
+ChangeEffect show_changed(Window& window, std::unique_ptr<ViewedScene>& viewed,
+                          std::unique_ptr<ViewedScene> next, ChangeMade made, ChangeComparison& comparison) {
+  made.effect.words = changes_between(*viewed, *next);
   window.add_ticks(viewed->player->samples());
-  window.show_scene(next->drawn, effect.t_s);
+  window.show_scene(next->drawn, made.effect.t_s);
   next->player = std::move(viewed->player);
-  viewed = std::move(next);
+  std::swap(viewed, next);
+  comparison.begin(std::move(next), *viewed, std::move(made.after));
+  return std::move(made.effect);
 }
 
 ViewScript read_script(const std::filesystem::path& file, const DrawnScene& drawn) {
@@ -148,13 +152,15 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
   Snapshot snapshot;
   ViewFiles files(command);
   SceneChanger changer(command);
+  ChangeComparison comparison;
   std::optional<ChangeEffect> effect;
   PastView past;
   FrameMeter meter;
   std::optional<VideoFile> video;
-  double ahead_s = 0.0;  // simulated time that the frames are ahead of the ticks
+  double session_s = 0.0;  // processor time of the session
+  double ahead_s = 0.0;    // simulated time that the frames are ahead of the ticks
   for (std::uint64_t n = 0; n < *command.frames; ++n) {
-    meter.begin();
+    meter.begin(session_s);
     script.play(static_cast<double>(n) * kScriptFrame_s, window);
     const WindowInput input = window.take_input();
     PlayRequest request = request_of(input);
@@ -162,9 +168,10 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     for (const SceneChange& change : input.changes) changer.ask(change);
     try {
       if (auto next = changer.wait(*viewed)) {
-        effect = player.change_scene(next->scene, next->built, next->drawn, next->text);
+        ChangeMade made = player.change_scene(next->scene, next->built, next->drawn, next->text);
         request.asked = nullptr;  // the points belong to the scene before
-        show_changed(window, viewed, std::move(next), *effect);
+        effect = show_changed(window, viewed, std::move(next), std::move(made), comparison);
+        effect->forces = comparison.wait();  // so that frames are reproducible
       }
     } catch (const std::exception& e) {
       files.say(std::string("The scene is as it was: ") + e.what());
@@ -177,6 +184,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     const bool shows_past = back && !input.go_on;
     if (!shows_past) past.forget();  // kept states come and go
     request.paused = request.paused || shows_past;
+    const double session_began_s = thread_time_s();
     for (ahead_s += kScriptFrame_s; ahead_s > 0.5 / player.rate_hz(); ahead_s -= 1.0 / player.rate_hz()) {
       if (drag) {
         request.dragging = true;
@@ -191,10 +199,10 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     PastView::add_notes(player, snapshot.t_s, notes);
     const Snapshot& seen =
         shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(snapshot);
-    meter.end_session();
+    session_s += thread_time_s() - session_began_s;
     window.add_ticks(player.samples());
     if (!window.frame(seen, notes)) break;
-    meter.end();
+    meter.end(session_s);
     if (!command.out.empty()) save_frame(window, frame_file(command.out, n));
     add_to_video(command, window, video);
     files.save_what_was_asked(window, input, *viewed, snapshot, [] { return true; });
@@ -249,6 +257,9 @@ struct LiveWindow {
   ViewScript script;
   SceneReload reload;
   SceneChanger changer;
+  ChangeComparison comparison{};
+  FrameMeter meter{};
+  std::string lost{};  // why the window cannot be shown any more; empty: it can
   std::optional<ChangeEffect> effect{};
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 };
@@ -270,10 +281,11 @@ bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, 
   try {
     auto next = live.changer.poll(*viewed);
     if (next == nullptr) return false;
+    ChangeMade made;
     session.change(request, [&] {
-      live.effect = viewed->player->change_scene(next->scene, next->built, next->drawn, next->text);
+      made = viewed->player->change_scene(next->scene, next->built, next->drawn, next->text);
     });
-    show_changed(live.window, viewed, std::move(next), *live.effect);
+    live.effect = show_changed(live.window, viewed, std::move(next), std::move(made), live.comparison);
     return true;
   } catch (const std::exception& e) {
     live.files.say(std::string("The scene is as it was: ") + e.what());
@@ -314,6 +326,7 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
   auto keep_next = std::chrono::steady_clock::now();
   bool open = true;
   while (open && !session.ended() && next == nullptr) {
+    live.meter.begin(session.processor_time_s());
     live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
                      live.window);
     const WindowInput input = live.window.take_input();
@@ -328,6 +341,7 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
       request.asked = nullptr;
       watch = {};
     }
+    if (auto forces = live.comparison.poll()) live.effect->forces = forces;
     const auto back = PastView::shown(player, shown.t_s, input.back_s);
     if (back && input.go_on) {
       go_back(live, session, request, player, *back);
@@ -341,13 +355,20 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
     session.shown(viewed->drawn, shown);
     shown.presses = watch.presses(input, request, player, session, shown.tick);
     live.window.add_ticks(player.samples());
-    open = live.window.frame(
-        shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),
-        notes_of(live, player, shown.t_s));
+    try {
+      open = live.window.frame(
+          shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),
+          notes_of(live, player, shown.t_s));
+    } catch (const std::exception& e) {
+      live.lost = e.what();
+      break;
+    }
     live.files.save_what_was_asked(live.window, input, *viewed, shown, [&] { return session.hold(request); });
     if (input.reload) live.reload.ask();
     if (!player.is_real()) next = live.reload.poll();
+    live.meter.end(session.processor_time_s());
   }
+  live.comparison.cancel();
   return session.stop();
 }
 
@@ -380,6 +401,7 @@ int view(const ViewCommand& command) {
                      "--frames needs a simulated device; add --device premium-1.5");
   }
   ask_video(command);
+  const GlfwLibrary display;  // a missing display is refused before the scene is built
   if (!command.out.empty()) std::filesystem::create_directories(command.out);
   const auto real = open_real_device(scene);
   build_viewed_scene(command, *viewed, progress_on_terminal());
@@ -387,7 +409,9 @@ int view(const ViewCommand& command) {
   print_notes(viewed->built);
   ViewScript script = read_script(command.script, viewed->drawn);
   // With --frames the pictures show only the scene, unless a script acts as the window's user.
-  Window window(viewed->drawn, {.visible = !command.frames || (command.out.empty() && command.video.empty()),
+  Window window(viewed->drawn, {.width = command.width,
+                                .height = command.height,
+                                .visible = !command.frames || (command.out.empty() && command.video.empty()),
                                 .panels = !command.frames || !command.script.empty()});
   const device::StopOnSignal stop;
   if (real) {
@@ -409,10 +433,12 @@ int view(const ViewCommand& command) {
                   SceneReload(command, viewed->text),
                   SceneChanger(command)};
   const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
+  fmt::print("{}\n", live.meter.in_words());
+  if (!live.lost.empty()) fmt::print(stderr, "the session ended: {}\n", live.lost);
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
   if (report.end == device::ServoEnd::stopped) return exit_status_of_signal(device::stop_signal());
-  return report.end == device::ServoEnd::lost ? 1 : 0;
+  return report.end == device::ServoEnd::lost || !live.lost.empty() ? 1 : 0;
 }
 
 }  // namespace hybrid

@@ -160,4 +160,33 @@ std::unique_ptr<ViewedScene> SceneReload::poll() {
   }
 }
 
+void ChangeComparison::begin(std::unique_ptr<ViewedScene> before, const ViewedScene& now,
+                             std::unique_ptr<WorldState> after) {
+  cancel();
+  stop_ = false;
+  before_ = std::move(before);
+  after_ = std::move(after);
+  forces_ = std::async(std::launch::async, [this, &now] {
+    return compare_at_rest(before_->built, *now.built.world, *after_, jnd_floor_N(now.scene), stop_);
+  });
+}
+
+std::optional<ComparedForces> ChangeComparison::poll() {
+  if (!forces_.valid() || forces_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return {};
+  return wait();
+}
+
+std::optional<ComparedForces> ChangeComparison::wait() {
+  if (!forces_.valid()) return {};
+  const std::optional<ComparedForces> forces = forces_.get();
+  before_.reset();
+  after_.reset();
+  return forces;
+}
+
+void ChangeComparison::cancel() {
+  stop_ = true;
+  (void)wait();
+}
+
 }  // namespace hybrid

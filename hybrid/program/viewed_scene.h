@@ -3,6 +3,7 @@
 // scene's file again, and SceneChanger builds a scene that the window's user changed.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <future>
@@ -68,6 +69,32 @@ class SceneChanger {
   mutable std::mutex guard_;
   std::string step_;  // of building; guard_ protects it
   std::future<std::unique_ptr<ViewedScene>> next_;
+};
+
+// Compares the forces before and after a change, on a thread of its own, while the session goes on. Keeps the
+// scene before the change until then.
+class ChangeComparison {
+ public:
+  ChangeComparison() = default;
+  ChangeComparison(const ChangeComparison&) = delete;
+  ChangeComparison& operator=(const ChangeComparison&) = delete;
+  ChangeComparison(ChangeComparison&&) = delete;
+  ChangeComparison& operator=(ChangeComparison&&) = delete;
+  ~ChangeComparison() { cancel(); }
+
+  // `now`: the scene after the change. It must live until cancel(), or until the forces are known.
+  void begin(std::unique_ptr<ViewedScene> before, const ViewedScene& now, std::unique_ptr<WorldState> after);
+  // The forces, once, when they are known. wait(): waits for them; empty if nothing is compared.
+  [[nodiscard]] std::optional<ComparedForces> poll();
+  [[nodiscard]] std::optional<ComparedForces> wait();
+  // Ends the comparison, if there is one. Call it before the scene after the change is dropped.
+  void cancel();
+
+ private:
+  std::unique_ptr<ViewedScene> before_;
+  std::unique_ptr<WorldState> after_;
+  std::atomic<bool> stop_{false};
+  std::future<std::optional<ComparedForces>> forces_;
 };
 
 // Loads the scene again when its file has changed, on a thread of its own. The old session goes on meanwhile,

@@ -12,6 +12,7 @@
 
 #include "device/loop/servo_loop.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/base/thread_time.h"
 #include "hybrid/base/triple_buffer.h"
 #include "hybrid/session/black_box.h"
 #include "hybrid/session/player.h"
@@ -81,6 +82,10 @@ class LiveSession {
     ask(request);
   }
   [[nodiscard]] bool ended() const { return ended_; }
+  // Processor time of the servo thread and of the relaxation thread so far (s).
+  [[nodiscard]] double processor_time_s() {
+    return relaxation_->busy_s() + (ended_ ? 0.0 : thread_time_s(thread_.native_handle()));
+  }
   device::ServoReport stop() {
     stop_ = true;
     if (thread_.joinable()) thread_.join();

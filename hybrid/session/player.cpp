@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/feel/just_noticeable.h"
@@ -51,6 +52,19 @@ std::size_t bytes_of(const WorldState& state) {
 }
 
 }  // namespace
+
+std::optional<ComparedForces> compare_at_rest(const BuiltScene& before, const World& world,
+                                              const WorldState& after, double jnd_floor_N,
+                                              const std::atomic<bool>& stop) {
+  const ScopedFlushToZero flushed;
+  const RestForce was = force_at_rest(*before.world, *before.state, stop);
+  const RestForce is = force_at_rest(world, after, stop);
+  if (stop) return std::nullopt;
+  return ComparedForces{.before_N = glm::length(was.force_N),
+                        .after_N = glm::length(is.force_N),
+                        .difference_jnd = jnd_of(is.force_N, was.force_N, jnd_floor_N),
+                        .at_rest = was.steady && is.steady};
+}
 
 glm::dvec3 SteeredPath::position(double t_s) const noexcept {
   return now_.dragged ? now_.goal_m
@@ -101,18 +115,17 @@ void Player::relax_at_once() {
   start_async_relaxation(*built_->state, arrival_);
 }
 
-ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
-                                  const std::string& text) {
+ChangeMade Player::change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
+                                const std::string& text) {
   const std::string why_not = why_no_take_over(*built_->world, *built.world);
   if (!why_not.empty())
     throw std::runtime_error(why_not + ", so the scene cannot change while it is felt; change its file");
   if (changes_.size() == kMostChanges) throw std::runtime_error("the session has changed too often");
   take_edits();  // those that wait belong to the old scene
-  const RestForce before = force_at_rest(*built_->world, *built_->state);
   const std::size_t voxels_before = voxels_of(*built_->state);
   if (!take_over(*built_->world, *built_->state, *built.world, built.state))
     throw std::runtime_error("the changed scene leaves the tool no free place; move the tool away first");
-  const RestForce after = force_at_rest(*built.world, *built.state);
+  std::unique_ptr<WorldState> after = kept_copy(*built.world, *built.state);
   if (async_) start_async_relaxation(*built.state, arrival_);
   scene_ = &scene;
   built_ = &built;
@@ -122,13 +135,8 @@ ChangeEffect Player::change_scene(const Scene& scene, BuiltScene& built, const D
   ++scenes_;
   edited_ = true;
   if (reference_) begin_reference();
-  return {.t_s = t_s(),
-          .before_N = glm::length(before.force_N),
-          .after_N = glm::length(after.force_N),
-          .difference_jnd = jnd_of(after.force_N, before.force_N, jnd_floor_N(scene)),
-          .at_rest = before.steady && after.steady,
-          .voxels_before = voxels_before,
-          .voxels_after = voxels_of(*built_->state)};
+  return {{.t_s = t_s(), .voxels_before = voxels_before, .voxels_after = voxels_of(*built_->state)},
+          std::move(after)};
 }
 
 // States are kept as often as they will fit, so that few are copied in vain.
@@ -146,7 +154,7 @@ void Player::keep_state() {
                 .hash = hash_,
                 .edits = applied_.size(),
                 .changes = changes_.size(),
-                .state = copy_state(*built_->world, *built_->state),
+                .state = kept_copy(*built_->world, *built_->state),
                 .device = device_.copy(),
                 .steering = path_->steering(),
                 .goal_m = goal_m_,

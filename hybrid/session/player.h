@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,19 @@ struct KeptState {
   std::size_t bytes = 0;  // memory that it takes
 };
 
+// A change that was made, and a copy of the state with which the session goes on. The state before it stays
+// in the old scene. compare_at_rest() compares the forces.
+struct ChangeMade {
+  ChangeEffect effect;  // without forces
+  std::unique_ptr<WorldState> after;
+};
+
+// The forces of two states at rest, at their own places of the device. Any thread may call it while the
+// states stay as they are. Empty if `stop` became true.
+[[nodiscard]] std::optional<ComparedForces> compare_at_rest(const BuiltScene& before, const World& world,
+                                                            const WorldState& after, double jnd_floor_N,
+                                                            const std::atomic<bool>& stop);
+
 class Player {
  public:
   // A recording keeps at most this much of a session (s): 86 MB at 1 kHz. Later ticks are not kept.
@@ -96,10 +110,11 @@ class Player {
 
   // The session goes on in another scene, which was made from `text` and built beside (take_over.h). Call it
   // only while held, or without a servo loop, and without a relaxation thread of the old scene. Keeps
-  // references to the arguments; those of the old scene are no longer used. Throws std::runtime_error if that
-  // is not possible; the session then goes on as it was. `words` of the result are left to the caller.
-  ChangeEffect change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
-                            const std::string& text);
+  // references to the arguments; those of the old scene are no longer used, and keep the state before the
+  // change. Throws std::runtime_error if that is not possible; the session then goes on as it was. `words` of
+  // the result are left to the caller.
+  ChangeMade change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
+                          const std::string& text);
   // ---- going back; call these as change_scene() ----
   // Keeps the present state, if a second of the session has passed since the last one was kept. Nothing is
   // kept with a real device. States of an earlier scene are dropped.

@@ -290,7 +290,7 @@ class ReplayedScene {
   void take_change(const RecordedChange& change) {
     if (change.text.empty()) {
       // The session was copied when the state was kept, and once more when it went back to it.
-      built_.state = copy_state(world(), *copy_state(world(), state()));
+      built_.state = copy_state(world(), *kept_copy(world(), state()));
       start_relaxation(state());
       return;
     }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,13 +49,16 @@ struct ObjectChoices {
   std::string note{};  // why something cannot be changed; may be empty
 };
 
-// Forces on the hand at one place before and after a change, with all tissue at rest, and voxels of all soft
-// objects.
+// Forces on the hand at one place before and after a change, with all tissue at rest.
+struct ComparedForces {
+  double before_N = 0.0, after_N = 0.0, difference_jnd = 0.0;
+  bool at_rest = true;  // false: a force had not come to rest, and may be some percent off
+};
+// A change of a scene that was felt meanwhile; voxels of all soft objects.
 struct ChangeEffect {
   std::string words{};  // the change
   double t_s = 0.0;
-  double before_N = 0.0, after_N = 0.0, difference_jnd = 0.0;
-  bool at_rest = true;  // false: a force had not come to rest, and may be some percent off
+  std::optional<ComparedForces> forces{};  // empty: they are being compared
   std::size_t voxels_before = 0, voxels_after = 0;
 };
 

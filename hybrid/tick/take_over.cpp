@@ -47,11 +47,11 @@ void take_edited_values(const World& before_world, const WorldState& before, con
 
 // Relaxes all tissue every few ticks. Without that, tissue of unlike stiffness may not come to rest. Returns
 // the force when it is steady.
-RestForce stand_still(const World& world, WorldState& state, int most_ticks) {
+RestForce stand_still(const World& world, WorldState& state, int most_ticks, const std::atomic<bool>& stop) {
   start_async_relaxation(state, Arrival::at_once);
   const device::DeviceState still{.position_m = state.device_m};
   RestForce rest;
-  for (int n = 1; n <= most_ticks && !rest.steady; ++n) {
+  for (int n = 1; n <= most_ticks && !rest.steady && !stop.load(std::memory_order_relaxed); ++n) {
     const TickResult felt = haptic_tick(world, state, still, 1e-3);
     if (n % kSteadyTicks != 0) continue;
     const glm::dvec3 now = coupling_N_per_m(world, state) * (felt.proxy_m - felt.device_m);
@@ -77,7 +77,7 @@ bool take_over(const World& before_world, const WorldState& before, const World&
   take_edited_values(before_world, before, world, *state);
   if (!start_outside(world, *state, before.device_m, before.proxy_m, before.proxy_m - before.device_m))
     return false;
-  (void)stand_still(world, *state, kMostPressing);
+  (void)stand_still(world, *state, kMostPressing, std::atomic<bool>(false));
   if (std::ranges::any_of(state->async.objects, [](const auto& object) { return object != nullptr; })) {
     const std::vector<ObjectFeel> feel = state->feel;
     state = copy_state(world, *state);  // without asynchronous relaxation
@@ -93,10 +93,10 @@ bool take_over(const World& before_world, const WorldState& before, const World&
   return true;
 }
 
-RestForce force_at_rest(const World& world, const WorldState& state) {
+RestForce force_at_rest(const World& world, const WorldState& state, const std::atomic<bool>& stop) {
   if (state.proxy_m == state.device_m) return {glm::dvec3(0.0), true};  // nothing is touched
   const std::unique_ptr<WorldState> copy = copy_state(world, state);
-  return stand_still(world, *copy, kMostResting);
+  return stand_still(world, *copy, kMostResting, stop);
 }
 
 }  // namespace hybrid

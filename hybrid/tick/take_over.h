@@ -2,6 +2,7 @@
 // A session goes on in another world, between two ticks: the same scene with an object that was changed.
 #pragma once
 
+#include <atomic>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <string>
@@ -28,6 +29,9 @@ struct RestForce {
   glm::dvec3 force_N{0.0};
   bool steady = false;  // false: it still changed by more than 0.2 % in a tenth of a second
 };
-[[nodiscard]] RestForce force_at_rest(const World& world, const WorldState& state);
+// Any thread may call it while the state stays as it is. Ends early, with a force that is not steady, once
+// `stop` is true.
+[[nodiscard]] RestForce force_at_rest(const World& world, const WorldState& state,
+                                      const std::atomic<bool>& stop);
 
 }  // namespace hybrid

@@ -40,7 +40,7 @@ void FramePainter::choose_fonts(int height) {
   renderer_.set_font(overlay_->font());
 }
 
-void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options) {
+bool FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options) {
   choose_fonts(options.height);
   renderer_.set_view(options.view);
   tissue_.set(options.view);
@@ -74,7 +74,7 @@ void FramePainter::paint(const Snapshot& snapshot, const Camera& camera, const F
       content.inset = OverlayContent::Inset{near, nearer};
     }
   }
-  renderer_.finish(overlay_->build(scene_, snapshot, content));
+  return renderer_.finish(overlay_->build(scene_, snapshot, content));
 }
 
 }  // namespace hybrid

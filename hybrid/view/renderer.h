@@ -42,6 +42,8 @@ class Renderer {
 
   // Sets how the following frames show the scene.
   void set_view(const ViewSettings& view);
+  // A frame whose views and overlay are as before costs no drawing. Otherwise only the part of each view is
+  // drawn in which something changed (view_changes.h).
   // Starts a frame and uploads the snapshot's moving vertices. Width and height are 1 to 8192 pixels;
   // otherwise throws std::runtime_error. `tissue` has taken the snapshot. `scene` must be the scene that the
   // renderer was made from.
@@ -49,8 +51,9 @@ class Renderer {
              int height);
   // Draws the scene into a part of the frame, over its content. A frame has two such views at most.
   void draw(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const PixelRect& where);
-  // Draws the overlay and ends the frame. Throws std::runtime_error on an OpenGL error anywhere in the frame.
-  void finish(const OverlayMesh& overlay);
+  // Draws the overlay and ends the frame. Returns false if the frame is as the one before. Throws
+  // std::runtime_error on an OpenGL error anywhere in the frame.
+  bool finish(const OverlayMesh& overlay);
 
   // Copies the finished frame to the context's default framebuffer (a window).
   void present(int width, int height);

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "hybrid/view/gl/rigid_layer.h"
 #include "hybrid/view/palette.h"
-#include "hybrid/view/rigid_layer.h"
 #include "hybrid/view/tool_and_arrow.h"
 #include "polygon/mesh/is_finite.h"
 
@@ -16,6 +16,21 @@ namespace {
 // Without a graphics card, meshes of more triangles are lit at their vertices. In a window such triangles are
 // a few pixels large.
 constexpr std::size_t kLitByVertex = 10'000;
+
+// [part] the largest of its vertices' values.
+std::vector<PartMove> most_of_parts(const SceneMesh& mesh, const std::vector<PartMove>& of_vertex) {
+  std::vector<PartMove> moves;
+  moves.reserve(mesh.mesh.parts.size());
+  for (const MeshPart& part : mesh.mesh.parts) {
+    PartMove& most = moves.emplace_back();
+    for (std::size_t n = part.first; n < part.first + part.count; ++n) {
+      const PartMove& by = of_vertex[mesh.moving.indices[n]];
+      most.moved_m = std::max(most.moved_m, by.moved_m);
+      most.recoloured = std::max(most.recoloured, by.recoloured);
+    }
+  }
+  return moves;
+}
 
 }  // namespace
 
@@ -76,11 +91,23 @@ void SceneMeshes::move_surface(SceneMesh& mesh, const std::vector<glm::dvec3>& a
   const bool moved = mesh.moved_m != moved_m;
   const std::uint64_t number = tissue.values_number(object);
   if (!moved && number == mesh.values_number) return;
+  // Up to this value tissue has its own colour.
+  const float own = palette::kOwnUntil * static_cast<float>(tissue.scale().end);
+  std::vector<PartMove> by(moved_m.size());  // [vertex]
+  for (std::size_t v = 0; v < by.size(); ++v) {
+    const bool first = mesh.moved_m.size() != moved_m.size();
+    const float length = glm::length(first ? moved_m[v] : moved_m[v] - mesh.moved_m[v]);
+    by[v] = {.moved_m = std::isfinite(length) ? length : 0.0F,
+             .recoloured = std::max(mesh.moving.vertices[v].value, own)};
+  }
   mesh.moved_m = moved_m;
   mesh.values_number = number;
   mesh.most_moved_m = move_vertices(mesh.moving, at_rest, moved_m, origin_m_);
   const std::vector<float>& values = tissue.values(object);
   for (std::size_t v = 0; v < values.size(); ++v) mesh.moving.vertices[v].value = values[v];
+  for (std::size_t v = 0; v < by.size(); ++v)
+    by[v].recoloured = std::abs(std::max(mesh.moving.vertices[v].value, own) - by[v].recoloured);
+  mesh.moves = most_of_parts(mesh, by);
   update_parts(mesh.moving, mesh.mesh.parts);
   mesh.mesh.stream(mesh.moving);
 }
@@ -88,6 +115,7 @@ void SceneMeshes::move_surface(SceneMesh& mesh, const std::vector<glm::dvec3>& a
 void SceneMeshes::move(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue) {
   for (std::size_t i = 0; i < meshes_.size(); ++i) {
     SceneMesh& mesh = meshes_[i];
+    mesh.moves.clear();
     mesh.placed = place_rigid(snapshot.place_of(i), origin_m_);
     if (!mesh.soft || i >= scene.objects.size()) continue;
     if (i < snapshot.soft_moved_m.size())

@@ -31,6 +31,18 @@ struct GlSection {
   void release();
 };
 
+// How much a part of a mesh changed: at most these, over all its vertices.
+struct PartMove {
+  float moved_m = 0.0F;
+  float recoloured = 0.0F;  // change of DrawVertex::value
+
+  PartMove& operator+=(const PartMove& more) {
+    moved_m += more.moved_m;
+    recoloured += more.recoloured;
+    return *this;
+  }
+};
+
 struct SceneMesh {
   GlMesh mesh;
   bool soft = false;
@@ -48,6 +60,7 @@ struct SceneMesh {
   DrawMesh moving;
   std::vector<glm::vec3> moved_m;
   std::uint64_t values_number = 0;
+  std::vector<PartMove> moves;  // [part] since the frame before; empty: none
 };
 
 class SceneMeshes {

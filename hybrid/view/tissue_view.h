@@ -18,6 +18,8 @@ namespace hybrid {
 struct ColourScale {
   TissueColour colour = TissueColour::displacement;
   double end = 0.0;  // m; for strain and limits a share
+
+  friend bool operator==(const ColourScale&, const ColourScale&) = default;
 };
 
 struct TissueSlice {

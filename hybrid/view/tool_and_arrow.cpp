@@ -9,6 +9,8 @@
 namespace hybrid {
 namespace {
 
+// Thickness of the arrow, as a share of the view's height, and its head's in thicknesses.
+constexpr double least_thick = 0.0035, most_thick = 0.007, head_thick = 2.4;
 constexpr double punch_height = 3.0;  // height of the body above the face, in radii
 // Distance of the tool's disc from the tool towards the eye, in radii of the disc. The surface that the tool
 // lies on does not cut the disc if the eye is more than 20° above the surface.
@@ -51,8 +53,8 @@ ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, co
   const double length = glm::length(along);
   if (!(length > 0.0) || !std::isfinite(length)) return arrow;
   // The shaft is thinner than the tool, but thick enough to be seen.
-  const double thick =
-      std::clamp(0.4 * scene.tool_radius_m, 0.0035 * camera.view_height_m(), 0.007 * camera.view_height_m());
+  const double thick = std::clamp(0.4 * scene.tool_radius_m, least_thick * camera.view_height_m(),
+                                  most_thick * camera.view_height_m());
   const double head = std::min(0.5 * length, 5.0 * thick);
   const double thin = std::min(thick, 0.4 * head);
   const glm::dmat3 axes = axes_along(along / length);
@@ -60,8 +62,16 @@ ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, co
   arrow.visible = true;
   arrow.shaft = placed(start, {axes[0] * thin, axes[1] * thin, axes[2] * (length - head)});
   arrow.head = placed(start + axes[2] * (length - head),
-                      {axes[0] * (2.4 * thin), axes[1] * (2.4 * thin), axes[2] * head});
+                      {axes[0] * (head_thick * thin), axes[1] * (head_thick * thin), axes[2] * head});
   return arrow;
+}
+
+double arrow_thickness_m(const Camera& camera) {
+  return head_thick * most_thick * camera.view_height_m();
+}
+
+double tool_reach_m(const DrawnScene& scene) {
+  return scene.tool_is_punch ? std::hypot(1.0, punch_height) * scene.tool_radius_m : scene.tool_radius_m;
 }
 
 glm::mat4 place_tool(const DrawnScene& scene, const glm::dvec3& at_m, const glm::dvec3& origin_m) {

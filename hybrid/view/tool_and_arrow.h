@@ -26,6 +26,11 @@ struct ArrowPlacement {
 ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
                            const glm::dvec3& origin_m);
 
+// No point of the arrow is further from its axis.
+[[nodiscard]] double arrow_thickness_m(const Camera& camera);
+// No point of the tool is further from its place.
+[[nodiscard]] double tool_reach_m(const DrawnScene& scene);
+
 // Transform of the unit ball (for a punch: the unit cylinder) to the tool. The lower face of a flat punch is
 // the disc about `at_m`. Its body is above, along the scene's +z.
 glm::mat4 place_tool(const DrawnScene& scene, const glm::dvec3& at_m, const glm::dvec3& origin_m);

@@ -14,6 +14,8 @@ namespace hybrid {
 struct ObjectLook {
   bool visible = true;
   float opacity = 1.0F;  // 0 to 1
+
+  friend bool operator==(const ObjectLook&, const ObjectLook&) = default;
 };
 
 // A plane across the scene, perpendicular to an axis. The part beyond the plane along the axis is left out.
@@ -22,6 +24,8 @@ struct ClipPlane {
   int axis = 0;             // 0: x, 1: y, 2: z
   double share = 0.5;       // place along the axis within the scene's bounding ball, 0 to 1
   bool other_side = false;  // the part before the plane is left out instead
+
+  friend bool operator==(const ClipPlane&, const ClipPlane&) = default;
 };
 
 // A plane through all soft objects, perpendicular to an axis. The plane cuts the tissue at rest. The
@@ -60,6 +64,8 @@ struct ViewSettings {
     return object < looks.size() ? looks[object] : ObjectLook{};
   }
   [[nodiscard]] bool sliced() const { return slices[0].on || slices[1].on || slices[2].on; }
+
+  friend bool operator==(const ViewSettings&, const ViewSettings&) = default;
 };
 
 // Coefficients of the plane, relative to `origin_m`. Its positive side is drawn. Empty: nothing is clipped.

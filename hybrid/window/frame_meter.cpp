@@ -8,29 +8,26 @@
 namespace hybrid {
 namespace {
 
-double clock_s(clockid_t clock) {
+// Of the whole process.
+double processor_time_s() {
   timespec now{};
-  clock_gettime(clock, &now);
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace
 
-void FrameMeter::begin() {
+void FrameMeter::begin(double session_s) {
   start_ = std::chrono::steady_clock::now();
-  cpu_start_s_ = clock_s(CLOCK_PROCESS_CPUTIME_ID);
-  thread_start_s_ = clock_s(CLOCK_THREAD_CPUTIME_ID);
+  cpu_start_s_ = processor_time_s();
+  session_start_s_ = session_s;
 }
 
-void FrameMeter::end_session() {
-  session_now_s_ = clock_s(CLOCK_THREAD_CPUTIME_ID) - thread_start_s_;
-}
-
-void FrameMeter::end() {
+void FrameMeter::end(double session_s) {
   if (++frames_ <= kWarmUp) return;
   time_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  cpu_s_ += clock_s(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_s_;
-  session_s_ += session_now_s_;
+  cpu_s_ += processor_time_s() - cpu_start_s_;
+  session_s_ += session_s - session_start_s_;
 }
 
 std::string FrameMeter::in_words() const {

@@ -14,10 +14,10 @@ class FrameMeter {
   // The first frames are not counted, because the driver compiles shaders during them.
   static constexpr std::uint64_t kWarmUp = 5;
 
-  // Call in this order in each frame: before the session's ticks, after them, and after the frame was shown.
-  void begin();
-  void end_session();
-  void end();
+  // Call at the beginning and at the end of each frame. `session_s`: processor time of the session so far, on
+  // whatever threads it runs.
+  void begin(double session_s);
+  void end(double session_s);
 
   // "120 frames: 30.1 frames/s; a frame takes …", or the reason why there are no figures.
   [[nodiscard]] std::string in_words() const;
@@ -25,7 +25,7 @@ class FrameMeter {
  private:
   std::uint64_t frames_ = 0;  // with those that are not counted
   std::chrono::steady_clock::time_point start_{};
-  double cpu_start_s_ = 0.0, thread_start_s_ = 0.0, session_now_s_ = 0.0;
+  double cpu_start_s_ = 0.0, session_start_s_ = 0.0;
   double time_s_ = 0.0, cpu_s_ = 0.0, session_s_ = 0.0;  // sums over the frames that count
 };
 

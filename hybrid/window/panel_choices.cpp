@@ -49,13 +49,14 @@ std::string grouped(std::size_t number) {
 }
 
 // The verdict on the force at the place of the change.
-std::string verdict_on(const ChangeEffect& effect) {
-  if (effect.before_N == 0.0 && effect.after_N == 0.0)
+std::string verdict_on(const std::optional<ComparedForces>& forces) {
+  if (!forces) return "The forces at that place are being compared.";
+  if (forces->before_N == 0.0 && forces->after_N == 0.0)
     return "The tool touched nothing then. Change it in contact to compare forces.";
-  if (effect.difference_jnd < kLeastShown_jnd) return "The force is the same.";
-  const std::string jnd = (effect.at_rest ? "" : "about ") + with_digits(effect.difference_jnd, 2) + " JND";
-  return effect.difference_jnd < 1.0 ? "The difference is " + jnd + ": no hand tells it."
-                                     : "The difference is " + jnd + ": a hand tells it.";
+  if (forces->difference_jnd < kLeastShown_jnd) return "The force is the same.";
+  const std::string jnd = (forces->at_rest ? "" : "about ") + with_digits(forces->difference_jnd, 2) + " JND";
+  return forces->difference_jnd < 1.0 ? "The difference is " + jnd + ": no hand tells it."
+                                      : "The difference is " + jnd + ": a hand tells it.";
 }
 
 }  // namespace
@@ -113,7 +114,8 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
   write(effect.words);
   std::vector<std::array<std::string, 3>> rows{
       {"", "before", "after"},
-      {"force at that place", force_words(effect.before_N), force_words(effect.after_N)}};
+      {"force at that place", effect.forces ? force_words(effect.forces->before_N) : "…",
+       effect.forces ? force_words(effect.forces->after_N) : "…"}};
   if (const std::optional<ChangeMark>& mark = frame.history.last_change()) {
     constexpr double ever = std::numeric_limits<double>::infinity();
     const TickTimes after = frame.history.times(mark->t_s, ever);
@@ -127,7 +129,7 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
   }
   rows.push_back({"voxels", grouped(effect.voxels_before), grouped(effect.voxels_after)});
   write_rows(pen, "effect", rows);
-  write(verdict_on(effect));
+  write(verdict_on(effect.forces));
 }
 
 }  // namespace hybrid

@@ -8,7 +8,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <deque>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -18,42 +17,24 @@
 #include <utility>
 
 #include "hybrid/view/frame_painter.h"
+#include "hybrid/window/glfw_library.h"
 #include "hybrid/window/script_events.h"
 #include "hybrid/window/window_keys.h"
 
 namespace hybrid {
 namespace {
 
-std::string glfw_reason() {
-  const char* text = nullptr;
-  return glfwGetError(&text) != GLFW_NO_ERROR && text != nullptr ? text : "no reason given";
-}
-
-// GLFW runs as long as a window exists.
-struct Library {
-  Library() {
-    if (glfwInit() == GLFW_TRUE) return;
-    const char* const display = std::getenv("DISPLAY");
-    throw std::runtime_error("no window can be opened: " + glfw_reason() + " (DISPLAY is " +
-                             (display != nullptr && *display != '\0' ? display : "not set") +
-                             "); start it from a desktop session or with ssh -X, or let `hybrid run SCENE "
-                             "--picture FILE.png` draw without a display");
-  }
-  Library(const Library&) = delete;
-  Library& operator=(const Library&) = delete;
-  Library(Library&&) = delete;
-  Library& operator=(Library&&) = delete;
-  ~Library() { glfwTerminate(); }
-};
-
 struct CloseWindow {
-  void operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
+  void operator()(GLFWwindow* window) const {
+    if (!display_is_gone()) glfwDestroyWindow(window);
+  }
 };
 
 enum class Drag { none, orbit, pan, tool, slice, object };
 
-constexpr int kMostPixels = 8192;    // most pixels along a side of a frame
-constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets
+constexpr int kMostPixels = 8192;        // most pixels along a side of a frame
+constexpr double kIdle_s = 1.0 / 120.0;  // wait for input after a frame in which nothing changed
+constexpr float kSlowest_s = 0.25F;      // longest time between frames that the panel gets
 
 struct NamedKey {
   std::string_view name;
@@ -86,13 +67,14 @@ constexpr std::array<std::pair<char, UiKey>, 6> kLetters{
 }  // namespace
 
 struct Window::State {
-  Library library;
+  GlfwLibrary library;
   std::unique_ptr<GLFWwindow, CloseWindow> window;
   const DrawnScene* scene;
   std::optional<FramePainter> painter;
   Camera camera;
   bool framed = false;  // has the view been chosen? It needs the tool's position from the first snapshot
   bool painted = false;
+  bool exposed = true;  // the display has lost the window's content
   Drag drag = Drag::none;
   double x = 0.0, y = 0.0;  // position of the pointer (pixels of the framebuffer)
   glm::dvec3 grip_m{0.0};   // from the point under the pointer to the tool, when the drag began
@@ -300,13 +282,25 @@ struct Window::State {
     options.view = user.view;
     panels.show(panel);
     options.panel = user.panels && layout.column.width > 0 ? &panels : nullptr;
-    painter->paint(snapshot, camera, options);
-    painter->present(options.width, options.height);
+    const bool changed = painter->paint(snapshot, camera, options);
     const PanelResult asked = panels.take_result();
     for (const ViewAction& action : asked.actions) hybrid::act(user, action);
     wants_text = asked.wants_text;
     wants_presses = asked.wants_presses;
     input.end_frame();
+    show(changed, options);
+  }
+
+  // A frame as the one before is not shown again. Then there is no wait for the display's refresh, so wait
+  // here.
+  void show(bool changed, const FrameOptions& frame) {
+    if (changed || std::exchange(exposed, false)) {
+      painter->present(frame.width, frame.height);
+      glfwSwapBuffers(window.get());
+    } else if (visible) {
+      glfwWaitEventsTimeout(kIdle_s);
+    }
+    painted = true;
   }
 
   // All hidden frames last equally long, so that they are reproducible.
@@ -347,6 +341,7 @@ Window::Window(const DrawnScene& scene, const WindowOptions& options) {
     State& state = State::of(w);
     if (state.wants_text) state.input.typed.push_back(static_cast<char32_t>(c));
   });
+  glfwSetWindowRefreshCallback(handle, [](GLFWwindow* w) { State::of(w).exposed = true; });
   glfwSetScrollCallback(handle, [](GLFWwindow* w, double, double y) { State::of(w).wheel(y); });
   glfwMakeContextCurrent(handle);
   glfwSwapInterval(options.visible ? 1 : 0);
@@ -381,6 +376,7 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   State& s = *state_;
   GLFWwindow* const handle = s.window.get();
   glfwPollEvents();
+  if (const std::string why = why_window_is_lost(); !why.empty()) throw std::runtime_error(why);
   s.play_events();
   if (s.user.quit || glfwWindowShouldClose(handle) == GLFW_TRUE) return false;
   s.device_m = snapshot.device_m;
@@ -391,8 +387,6 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   s.choose_view(snapshot);
   glfwMakeContextCurrent(handle);
   s.paint(snapshot, notes);
-  glfwSwapBuffers(handle);
-  s.painted = true;
   return true;
 }
 

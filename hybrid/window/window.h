@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The viewer's window. It only reads snapshots. It reports the requests of mouse, keyboard, panel and
-// scripts, and leaves it to the session to act on them. No other part of the project knows GLFW. All calls
+// scripts, and leaves it to the session to act on them. Only it and glfw_library.cpp know GLFW. All calls
 // must come from the program's first thread. The keys are in README.md and in window_keys.h.
 #pragma once
 
@@ -64,7 +64,7 @@ class Window {
   [[nodiscard]] const DrawnScene& scene() const;
 
   // Shows a snapshot and handles the input since the last call. Waits for the display's refresh. Returns
-  // false if the user closed the window. Throws std::runtime_error if the driver fails.
+  // false if the user closed the window. Throws std::runtime_error if the driver fails or the window is lost.
   bool frame(const Snapshot& snapshot, const SessionNotes& notes = {});
 
   // Adds every tick since the last frame, for the charts.

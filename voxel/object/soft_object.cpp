@@ -21,7 +21,7 @@ constexpr std::size_t kWorkOfVisit = 4;
 
 }  // namespace
 
-SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
+SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice, Tables tables)
     : lattice_(std::move(lattice)),
       state_(*lattice_),
       chain_(*lattice_),
@@ -53,7 +53,7 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
     bound_touch_.reserve(kMaxTouched);
     block_seen_.resize(lattice_->block_count());
   }
-  if (lattice_->voxel_count() < kPreparedWhole) {
+  if (tables == Tables::whole && lattice_->voxel_count() < kPreparedWhole) {
     state_.populate(relaxation_.couplings().rows_in_use());
     pair_claims_.populate();
     chain_.prepare_all();
@@ -63,8 +63,8 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice)
 
 SoftObject::~SoftObject() = default;
 
-std::unique_ptr<SoftObject> SoftObject::copy() const {
-  auto result = std::make_unique<SoftObject>(lattice_);
+std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
+  auto result = std::make_unique<SoftObject>(lattice_, tables);
   result->state_ = state_;
   if (!obstacles_.empty()) result->reserve_obstacles();
   result->obstacles_ = obstacles_;

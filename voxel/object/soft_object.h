@@ -70,7 +70,7 @@ class SoftObject {
   // Largest number of touched voxels. Other voxels near the tool are left to the next tick.
   static constexpr std::size_t kMaxTouched = 4096;
 
-  explicit SoftObject(std::shared_ptr<const Lattice> lattice);
+  explicit SoftObject(std::shared_ptr<const Lattice> lattice, Tables tables = Tables::whole);
   ~SoftObject();
   SoftObject(const SoftObject&) = delete;
   SoftObject& operator=(const SoftObject&) = delete;
@@ -78,7 +78,7 @@ class SoftObject {
   SoftObject& operator=(SoftObject&&) = delete;
   // Returns an object in the same state that shares the lattice. For references beside a running session.
   // Allocates.
-  [[nodiscard]] std::unique_ptr<SoftObject> copy() const;
+  [[nodiscard]] std::unique_ptr<SoftObject> copy(Tables tables = Tables::whole) const;
 
   [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
   [[nodiscard]] const std::shared_ptr<const Lattice>& shared_lattice() const { return lattice_; }

@@ -71,9 +71,6 @@ void set_uniform(GLuint program, const char* name, float value) {
 void set_uniform(GLuint program, const char* name, int value) {
   glUniform1i(glGetUniformLocation(program, name), value);
 }
-void set_uniform(GLuint program, const char* name, const glm::ivec2& value) {
-  glUniform2i(glGetUniformLocation(program, name), value.x, value.y);
-}
 void set_uniform(GLuint program, const char* name, const glm::vec2& value) {
   glUniform2fv(glGetUniformLocation(program, name), 1, glm::value_ptr(value));
 }
@@ -110,6 +107,20 @@ GLuint link_program(const char* vertex, const char* fragment) {
 
 void delete_program(GLuint program) {
   glDeleteProgram(program);
+}
+
+void clip_by_planes(bool cut, bool view) {
+  (cut ? glEnable : glDisable)(GL_CLIP_DISTANCE0);
+  (view ? glEnable : glDisable)(GL_CLIP_DISTANCE1);
+}
+
+void hide_backs(bool hidden) {
+  (hidden ? glEnable : glDisable)(GL_CULL_FACE);
+}
+
+void write_colours(bool written) {
+  const GLboolean mask = written ? GL_TRUE : GL_FALSE;
+  glColorMask(mask, mask, mask, mask);
 }
 
 const void* buffer_offset(std::size_t bytes) {
@@ -200,10 +211,14 @@ void GlMesh::draw() const {
 
 void GlMesh::draw_seen(const glm::mat4& clip_from_mesh, float margin, const ValueRange& values) const {
   glBindVertexArray(array);
+  std::vector<GLsizei> counts;
+  std::vector<const void*> offsets;
   for (const IndexRange& range : seen_ranges(parts, clip_from_mesh, margin, values)) {
-    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(range.count), GL_UNSIGNED_INT,
-                   buffer_offset(range.first * sizeof(std::uint32_t)));
+    counts.push_back(static_cast<GLsizei>(range.count));
+    offsets.push_back(buffer_offset(range.first * sizeof(std::uint32_t)));
   }
+  glMultiDrawElements(GL_TRIANGLES, counts.data(), GL_UNSIGNED_INT, offsets.data(),
+                      static_cast<GLsizei>(counts.size()));
 }
 
 void GlMesh::release() {
@@ -270,20 +285,40 @@ void GlCover::release() {
   array = 0;
 }
 
-void RenderTargets::create() {
-  glGenFramebuffers(1, &scene_frame);
-  glGenFramebuffers(1, &shown_frame);
-  glGenFramebuffers(1, &final_frame);
+bool ViewTargets::set_size(int width, int height) {
+  if (!scene.set_size(width, height)) return false;
+  if (shown_frame == 0) glGenFramebuffers(1, &shown_frame);
+  if (shown_depth != 0) glDeleteTextures(1, &shown_depth);
+  shown_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, width, height);
+  attach_targets(shown_frame, 0, shown_depth);
+  return true;
 }
 
-void RenderTargets::release() {
-  const std::array textures{scene_colour, scene_depth, shown_depth, final_colour};
-  glDeleteTextures(textures.size(), textures.data());
-  const std::array frames{scene_frame, shown_frame, final_frame};
-  glDeleteFramebuffers(frames.size(), frames.data());
+void ViewTargets::release() {
+  scene.release();
+  if (shown_depth != 0) glDeleteTextures(1, &shown_depth);
+  if (shown_frame != 0) glDeleteFramebuffers(1, &shown_frame);
+  *this = {};
 }
 
-void RenderTargets::set_size(int width, int height, int wanted) {
+bool FrameTarget::set_size(int to_width, int to_height) {
+  if (frame != 0 && width == to_width && height == to_height) return false;
+  release();
+  width = to_width, height = to_height;
+  glGenFramebuffers(1, &frame);
+  colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
+  attach_targets(frame, colour, 0);
+  return true;
+}
+
+void FrameTarget::release() {
+  if (frame == 0) return;
+  glDeleteTextures(1, &colour);
+  glDeleteFramebuffers(1, &frame);
+  *this = {};
+}
+
+int samples_for(int width, int height, int wanted) {
   if (width < 1 || height < 1 || width > kMostPixelsOfPicture || height > kMostPixelsOfPicture) {
     throw std::runtime_error("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
                              " pixels cannot be drawn; each side must be from 1 to " +
@@ -293,21 +328,14 @@ void RenderTargets::set_size(int width, int height, int wanted) {
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
   int factor = wanted;
   while (factor > 1 && std::max(width, height) * factor > std::min(most, kMostPixelsOfPicture)) --factor;
-  const int w = width * factor;
-  const int h = height * factor;
-  samples = factor;
-  if (w == built_width && h == built_height) return;
-  const std::array old{scene_colour, scene_depth, shown_depth, final_colour};
-  glDeleteTextures(old.size(), old.data());
-  scene_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, w, h);
-  scene_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
-  shown_depth = make_texture_target(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, w, h);
-  final_colour = make_texture_target(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
-  attach_targets(scene_frame, scene_colour, scene_depth);
-  attach_targets(shown_frame, 0, shown_depth);
-  attach_targets(final_frame, final_colour, 0);
-  built_width = w;
-  built_height = h;
+  return factor;
+}
+
+void copy_view(const ViewTargets& view, const FrameTarget& frame, const PixelRect& to) {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, view.scene.frame);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, frame.frame);
+  glBlitFramebuffer(0, 0, view.scene.width, view.scene.height, to.x, to.y, to.x + to.width, to.y + to.height,
+                    GL_COLOR_BUFFER_BIT, view.scene.width == to.width ? GL_NEAREST : GL_LINEAR);
 }
 
 void show_frame(GLuint frame, int width, int height, int to_width, int to_height) {

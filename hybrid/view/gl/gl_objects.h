@@ -34,7 +34,6 @@ void check_gl(const char* doing);
 // Sets a uniform of the program in use.
 void set_uniform(GlName program, const char* name, float value);
 void set_uniform(GlName program, const char* name, int value);
-void set_uniform(GlName program, const char* name, const glm::ivec2& value);
 void set_uniform(GlName program, const char* name, const glm::vec2& value);
 void set_uniform(GlName program, const char* name, const glm::vec3& value);
 void set_uniform(GlName program, const char* name, const glm::vec4& value);
@@ -51,6 +50,13 @@ void bind_image(GlName image);  // to the first unit
 // Compiles and links a program. Throws std::runtime_error with the driver's log.
 GlName link_program(const char* vertex, const char* fragment);
 void delete_program(GlName program);
+
+// Which planes of the program in use clip: that of a cut, and that of the view.
+void clip_by_planes(bool cut, bool view);
+// Are the backs of triangles left out?
+void hide_backs(bool hidden);
+// false: triangles write their depth only.
+void write_colours(bool written);
 
 // A byte offset into a buffer, as the pointer that OpenGL takes.
 const void* buffer_offset(std::size_t bytes);
@@ -102,22 +108,32 @@ struct GlCover {
   void release();
 };
 
-// The textures into which a frame is drawn, and their framebuffers.
-struct RenderTargets {
-  GlName scene_frame = 0, scene_colour = 0, scene_depth = 0;
+// The textures of one view. They keep their content from frame to frame.
+struct ViewTargets {
+  GlLayer scene;
   GlName shown_frame = 0, shown_depth = 0;  // depth of what must not be hidden
-  GlName final_frame = 0, final_colour = 0;
-  int built_width = 0, built_height = 0;  // of the scene's textures (pixels)
-  int samples = 1;                        // per pixel along each axis
-  // Holds the frame in pixels when it is complete. With one sample per pixel the scene is the frame.
-  [[nodiscard]] GlName frame() const { return samples == 1 ? scene_frame : final_frame; }
 
-  void create();
+  // Builds the textures anew if the size (samples) differs. Returns true if it did.
+  bool set_size(int width, int height);
   void release();
-  // Builds the textures anew if the size (pixels) has changed. `samples` becomes `wanted`, or less if the
-  // driver's textures would be too small. Throws std::runtime_error if a side is not from 1 to 8192 pixels.
-  void set_size(int width, int height, int wanted);
 };
+
+// The whole frame in pixels: the views, and the overlay over them.
+struct FrameTarget {
+  GlName frame = 0, colour = 0;
+  int width = 0, height = 0;
+
+  // Builds the texture anew if the size (pixels) differs. Returns true if it did.
+  bool set_size(int to_width, int to_height);
+  void release();
+};
+
+// Samples per pixel along each axis: `wanted`, or less if the driver's textures would be too small. Throws
+// std::runtime_error if a side of the frame is not from 1 to 8192 pixels.
+int samples_for(int width, int height, int wanted);
+
+// Copies the colours of a view to a part of the frame (pixels, y up).
+void copy_view(const ViewTargets& view, const FrameTarget& frame, const PixelRect& to);
 
 // Copies a framebuffer to the context's default one, whose size is to_width × to_height.
 void show_frame(GlName frame, int width, int height, int to_width, int to_height);
@@ -130,15 +146,21 @@ std::vector<std::uint8_t> read_frame(GlName frame, int width, int height);
 struct OverlayVertex {
   float x = 0.0F, y = 0.0F, u = 0.0F, v = 0.0F;
   std::uint32_t colour = 0;
+
+  friend bool operator==(const OverlayVertex&, const OverlayVertex&) = default;
 };
 struct OverlayMesh {
   struct Batch {
     std::size_t first = 0, count = 0;  // range of `indices`
     PixelRect inside;                  // clips the batch
+
+    friend bool operator==(const Batch&, const Batch&) = default;
   };
   std::vector<OverlayVertex> vertices;
   std::vector<std::uint32_t> indices;
   std::vector<Batch> batches;  // in drawing order
+
+  friend bool operator==(const OverlayMesh&, const OverlayMesh&) = default;
 };
 struct FontAtlas {
   int width = 0, height = 0;

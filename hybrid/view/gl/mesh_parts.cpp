@@ -100,16 +100,22 @@ std::array<glm::vec4, 6> planes_of_view(const glm::mat4& clip_from_mesh) {
 std::vector<IndexRange> seen_ranges(std::span<const MeshPart> parts, const glm::mat4& clip_from_mesh,
                                     float margin, const ValueRange& values) {
   const std::array<glm::vec4, 6> planes = planes_of_view(clip_from_mesh);
-  std::vector<IndexRange> ranges;
+  const glm::vec4 depth = glm::row(clip_from_mesh, 3);
+  std::vector<std::pair<float, IndexRange>> seen;  // distance of the part's middle from the eye's plane
   for (const MeshPart& part : parts) {
     const bool outside = std::ranges::any_of(planes, [&](const glm::vec4& plane) {
       return glm::dot(glm::vec3(plane), part.centre) + plane.w < -(part.radius + margin);
     });
     if (outside || !(part.most_value > values.above && part.most_value <= values.up_to)) continue;
-    if (!ranges.empty() && ranges.back().first + ranges.back().count == part.first) {
-      ranges.back().count += part.count;
+    seen.push_back({glm::dot(glm::vec3(depth), part.centre) + depth.w, {part.first, part.count}});
+  }
+  std::ranges::sort(seen, {}, [](const auto& part) { return part.first; });
+  std::vector<IndexRange> ranges;
+  for (const auto& [distance, range] : seen) {
+    if (!ranges.empty() && ranges.back().first + ranges.back().count == range.first) {
+      ranges.back().count += range.count;
     } else {
-      ranges.push_back({part.first, part.count});
+      ranges.push_back(range);
     }
   }
   return ranges;

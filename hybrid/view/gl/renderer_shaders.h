@@ -186,18 +186,17 @@ void main() {
 )";
 inline constexpr const char* layer_fragment = R"(
 uniform sampler2D layer_colour, layer_depth, shown_depth;
-uniform ivec2 corner;      // of the viewport in the frame
 // a and b: the depth of a surface that moves away by twice `apart` rises by b * (depth + a)^2.
 uniform vec2 further;
 out vec4 colour;
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float depth = texelFetch(layer_depth, pixel - corner, 0).r;
+  float depth = texelFetch(layer_depth, pixel, 0).r;
   if (depth >= 1.0) discard;
   float kept = texelFetch(shown_depth, pixel, 0).r;
   float from_end = depth + further.x;
   bool hides = kept < 1.0 && depth + further.y * from_end * from_end < kept;
-  vec4 own = texelFetch(layer_colour, pixel - corner, 0);
+  vec4 own = texelFetch(layer_colour, pixel, 0);
   colour = vec4(own.rgb, hides ? own.a : 1.0);
   gl_FragDepth = depth;
 }

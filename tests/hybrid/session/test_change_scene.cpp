@@ -3,7 +3,9 @@
 // beginning, its clock and edits go on, and its recording replays to the same state.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
+#include <future>
 #include <glm/geometric.hpp>
 #include <sstream>
 #include <thread>
@@ -53,9 +55,11 @@ class ChangedScene : public tests::SceneFile {
   }
   hybrid::ChangeEffect change(const std::string& text) {
     auto next = build(text);
-    const auto effect = player_->change_scene(next->scene, next->built, next->drawn, text);
+    hybrid::ChangeMade made = player_->change_scene(next->scene, next->built, next->drawn, text);
+    made.effect.forces = hybrid::compare_at_rest(now_->built, *next->built.world, *made.after,
+                                                 hybrid::jnd_floor_N(next->scene), std::atomic<bool>(false));
     now_ = std::move(next);
-    return effect;
+    return made.effect;
   }
   void steps(int periods, const PlayRequest& request = {}) {
     for (int n = 0; n < periods; ++n) player_->step(request);
@@ -92,11 +96,11 @@ TEST_F(ChangedScene, FeelsAsIfItHadBeenThatSceneFromTheBeginning) {
     steps(400);
     const double before = glm::length(player_->felt().force_N);
     const auto effect = change(text);
-    EXPECT_TRUE(effect.at_rest);
-    EXPECT_GT(effect.before_N, 0.02);
-    EXPECT_NEAR(effect.before_N, force_from_the_beginning(first_, 400), 0.01 * before);
+    EXPECT_TRUE(effect.forces->at_rest);
+    EXPECT_GT(effect.forces->before_N, 0.02);
+    EXPECT_NEAR(effect.forces->before_N, force_from_the_beginning(first_, 400), 0.01 * before);
     const double wanted = force_from_the_beginning(text, 400);
-    EXPECT_NEAR(effect.after_N, wanted, 0.01 * wanted) << text;
+    EXPECT_NEAR(effect.forces->after_N, wanted, 0.01 * wanted) << text;
     steps(100);
     EXPECT_NEAR(glm::length(player_->felt().force_N), wanted, 0.02 * wanted) << text;
     expect_replays();
@@ -117,10 +121,33 @@ TEST_F(ChangedScene, ClockAndEditsGoOnAndOtherForcesDoNotJump) {
   EXPECT_EQ(player_->state().edited.coupling_N_per_m, 450.0);
   EXPECT_EQ(player_->state().edited.feel.at(0)->static_friction, 0.7);
   EXPECT_EQ(player_->state().edited.tissue_factor.at(0), 2.0);
-  EXPECT_LT(effect.difference_jnd, 0.2);
+  EXPECT_LT(effect.forces->difference_jnd, 0.2);
   steps(1);
   EXPECT_LT(glm::length(player_->felt().force_N - force), 0.02 * glm::length(force));
   expect_replays();
+}
+
+TEST_F(ChangedScene, ForcesComparedWhileTheSessionGoesOnAreThoseOfTheMomentOfTheChange) {
+  begin(text_of({}));
+  steps(400);
+  auto next = build(text_of({}, 24000.0));
+  const hybrid::ChangeMade made = player_->change_scene(next->scene, next->built, next->drawn, next->text);
+  const double floor_N = hybrid::jnd_floor_N(next->scene);
+  const auto compare = [&](const std::atomic<bool>& stop) {
+    return hybrid::compare_at_rest(now_->built, *next->built.world, *made.after, floor_N, stop);
+  };
+  const auto at_once = compare(std::atomic<bool>(false));
+  const std::atomic<bool> go_on(false), stop(true);
+  auto beside = std::async(std::launch::async, [&] { return compare(go_on); });
+  steps(300, {.dragging = true, .goal_m = player_->felt().device_m + glm::dvec3(0.0, 0.0, 5e-3)});
+  const auto later = beside.get();
+  ASSERT_TRUE(at_once && later);
+  EXPECT_EQ(later->before_N, at_once->before_N);
+  EXPECT_EQ(later->after_N, at_once->after_N);
+  EXPECT_GT(later->difference_jnd, 1.0);
+  EXPECT_FALSE(compare(stop)) << "it ends when it is told to";
+  expect_replays();
+  player_.reset();
 }
 
 TEST_F(ChangedScene, ChangesAndEditsBetweenTheSameTicksReplayInTheirOrder) {

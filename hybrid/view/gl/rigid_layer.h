@@ -35,13 +35,4 @@ struct RigidLayer {
 // away from the eye by a small length. The matrix is that of a perspective projection and a rigid transform.
 [[nodiscard]] glm::vec2 depth_further(const glm::dmat4& clip_from_scene, double by_m);
 
-// The part of a view that contains a unit disc; empty: the disc is not in the view. `pixels`: of the view, y
-// up.
-struct ViewPart {
-  PixelRect pixels;
-  glm::mat4 whole_from_clip{1.0F};  // maps the part to the whole view
-};
-[[nodiscard]] std::optional<ViewPart> part_with_disc(const glm::mat4& clip, const glm::mat4& placed_disc,
-                                                     const PixelRect& pixels);
-
 }  // namespace hybrid
