@@ -20,9 +20,13 @@ int note_refusal(void*, void*) {
   return 0;
 }
 
-void note_break(void*, void*) {
+int note_break(void*) {
   connection_broken = true;
+  return 0;
 }
+
+// After note_break() Xlib calls this one, and ends the program only if there is none.
+void go_on(void*, void*) {}
 
 // By default Xlib ends the program at the first error of a display, and the session would be lost. GLFW loads
 // Xlib itself, if the display needs it, so its functions are looked up.
@@ -33,11 +37,15 @@ void survive_errors_of_display() {
   void* const display = reinterpret_cast<void* (*)()>(of_glfw)();
   if (display == nullptr) return;
   using Refused = int (*)(void*, void*);
-  using Broken = void (*)(void*, void*);
-  if (void* const set = dlsym(xlib, "XSetErrorHandler"))
-    reinterpret_cast<Refused (*)(Refused)>(set)(note_refusal);
-  if (void* const set = dlsym(xlib, "XSetIOErrorExitHandler"))
-    reinterpret_cast<void (*)(void*, Broken, void*)>(set)(display, note_break, nullptr);
+  using Broken = int (*)(void*);
+  using Exit = void (*)(void*, void*);
+  void* const set_refused = dlsym(xlib, "XSetErrorHandler");
+  void* const set_broken = dlsym(xlib, "XSetIOErrorHandler");
+  void* const set_exit = dlsym(xlib, "XSetIOErrorExitHandler");  // since libX11 1.7
+  if (set_refused != nullptr) reinterpret_cast<Refused (*)(Refused)>(set_refused)(note_refusal);
+  if (set_broken == nullptr || set_exit == nullptr) return;
+  reinterpret_cast<Broken (*)(Broken)>(set_broken)(note_break);
+  reinterpret_cast<void (*)(void*, Exit, void*)>(set_exit)(display, go_on, nullptr);
 }
 
 }  // namespace

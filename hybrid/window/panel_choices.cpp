@@ -114,8 +114,8 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
   write(effect.words);
   std::vector<std::array<std::string, 3>> rows{
       {"", "before", "after"},
-      {"force at that place", effect.forces ? force_words(effect.forces->before_N) : "…",
-       effect.forces ? force_words(effect.forces->after_N) : "…"}};
+      {"force at that place", effect.forces ? force_words(effect.forces->before_N) : "-",
+       effect.forces ? force_words(effect.forces->after_N) : "-"}};
   if (const std::optional<ChangeMark>& mark = frame.history.last_change()) {
     constexpr double ever = std::numeric_limits<double>::infinity();
     const TickTimes after = frame.history.times(mark->t_s, ever);
