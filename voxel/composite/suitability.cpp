@@ -25,8 +25,9 @@ constexpr double kMaxForceError = 0.14;
 constexpr double kPressedShare = 0.1, kLeastForce_N = 0.57;
 constexpr double kMaxThinShare = 0.02;  // of the stiffness of links at surfaces and where tissues meet
 
-// Share of the links' stiffness at surfaces and where tissues meet that belongs to links without a cell: of
-// sheets and rows of single voxels in air. Coarse levels know cells only. Looks at kRowsTried rows at most.
+// Links of sheets and rows of single voxels in air have no cell, and coarse levels have cells only. Returns
+// the share of such links in the stiffness of all links at surfaces and where tissues meet. Looks at
+// kRowsTried rows at most.
 double thin_tissue_share(const Lattice& lattice) {
   constexpr RowId kRowsTried = 20000;
   const Grid& g = lattice.grid();
