@@ -30,7 +30,7 @@ struct RigidBenchOptions {
   std::function<void(const RigidRow&)> on_row;      // as soon as there is one
 };
 
-// CGAL's tree of a larger mesh takes too long
+// Larger meshes are measured without CGAL's baselines, because CGAL's tree takes too long for them.
 inline constexpr std::size_t kMostBaselineTriangles = 2'000'000;
 
 // Throws std::invalid_argument (no such mesh, or nothing to do), polygon::MeshError (a file) and

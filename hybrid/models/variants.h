@@ -21,7 +21,7 @@ struct Variant {
   std::string left_out{};  // why the scene cannot have it, in words; empty: it can
 };
 
-// edited_scene() marks the reasons in the scene files of variants with it.
+// In the scene file of a variant, this text stands before the reason of each change (edited_scene()).
 inline constexpr std::string_view kVariantMark = "# hybrid compare: ";
 
 inline constexpr const char* kAsGiven = "as given";
