@@ -16,10 +16,15 @@ inline constexpr double kJndShare = 0.07;        // share of the reference
 inline constexpr double kJndFloor_N = 0.04;      // floor for a device without friction
 inline constexpr double kLeastDirected_N = 0.1;  // the direction of a smaller force cannot be felt
 
+// The just noticeable difference of a force (N).
+[[nodiscard]] inline double noticeable_N(const glm::dvec3& reference, double floor_N) noexcept {
+  return std::max(kJndShare * glm::length(reference), floor_N);
+}
+
 // Difference between `force` (N) and `reference` (N) in just noticeable differences.
 [[nodiscard]] inline double jnd_of(const glm::dvec3& force, const glm::dvec3& reference,
                                    double floor_N) noexcept {
-  return glm::length(force - reference) / std::max(kJndShare * glm::length(reference), floor_N);
+  return glm::length(force - reference) / noticeable_N(reference, floor_N);
 }
 
 // Angle between two forces (degrees). It is exactly 0 for equal forces. Neither may be 0.

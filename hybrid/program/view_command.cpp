@@ -155,6 +155,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
   ChangeComparison comparison;
   std::optional<ChangeEffect> effect;
   PastView past;
+  RestWish rest;
   FrameMeter meter;
   std::optional<VideoFile> video;
   double session_s = 0.0;  // processor time of the session
@@ -176,6 +177,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     } catch (const std::exception& e) {
       files.say(std::string("The scene is as it was: ") + e.what());
     }
+    rest.follow(input.compares_with_rest, player, files, [](const auto& change) { change(); });
     const auto back = PastView::shown(player, player.t_s(), input.back_s);
     if (back && input.go_on) {
       player.go_back(*back);
@@ -200,7 +202,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     const Snapshot& seen =
         shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(snapshot);
     session_s += thread_time_s() - session_began_s;
-    window.add_ticks(player.samples());
+    window.add_ticks(player.samples(), player.at_rest());
     if (!window.frame(seen, notes)) break;
     meter.end(session_s);
     if (!command.out.empty()) save_frame(window, frame_file(command.out, n));
@@ -323,6 +325,7 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
   Snapshot shown;
   PressWatch watch;
   PastView past;
+  RestWish rest;
   auto keep_next = std::chrono::steady_clock::now();
   bool open = true;
   while (open && !session.ended() && next == nullptr) {
@@ -341,6 +344,9 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
       request.asked = nullptr;
       watch = {};
     }
+    rest.follow(input.compares_with_rest, player, live.files, [&](const auto& change) {
+      if (session.hold(request)) change();
+    });
     if (auto forces = live.comparison.poll()) live.effect->forces = forces;
     const auto back = PastView::shown(player, shown.t_s, input.back_s);
     if (back && input.go_on) {
@@ -354,7 +360,7 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
     if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
     session.shown(viewed->drawn, shown);
     shown.presses = watch.presses(input, request, player, session, shown.tick);
-    live.window.add_ticks(player.samples());
+    live.window.add_ticks(player.samples(), player.at_rest());
     try {
       open = live.window.frame(
           shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),

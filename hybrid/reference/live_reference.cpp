@@ -49,7 +49,7 @@ std::optional<ForceAtRest> ReferenceSession::follow(std::span<const PassedTick> 
     const glm::dvec3 now_N = tick_at(last.device_m);
     glm::dvec3& earlier_N = before_N[n % kRestTicks];
     if (n >= kRestTicks && jnd_of(earlier_N, now_N, floor_N_) < kAtRest_jnd)
-      return ForceAtRest{last.t_s, last.coupling_N, now_N, jnd_of(last.coupling_N, now_N, floor_N_)};
+      return ForceAtRest{last.t_s, last.coupling_N, now_N, noticeable_N(now_N, floor_N_)};
     earlier_N = now_N;
   }
   return std::nullopt;

@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
@@ -29,13 +30,17 @@ struct PassedTick {
   bool soft = false;
 };
 
-// The forces between device and proxy of one tick: as felt, and once all tissue is at rest. `jnd`: their
-// difference in just noticeable differences.
+// The forces between device and proxy of one tick: as felt, and once all tissue is at rest.
+// `noticeable_N`: the just noticeable difference (JND) of the force at rest.
 struct ForceAtRest {
   double t_s = 0.0;
   glm::dvec3 felt_N{0.0}, at_rest_N{0.0};
-  double jnd = 0.0;
+  double noticeable_N = 0.0;
+  // Difference of the two forces (JND).
+  [[nodiscard]] double jnd() const noexcept { return glm::length(felt_N - at_rest_N) / noticeable_N; }
 };
+
+using ForcesAtRest = SpscRing<ForceAtRest>;
 
 // Why no reference can follow the session; empty if one can.
 [[nodiscard]] std::string why_no_live_reference(const World& world, const WorldState& state);
@@ -87,7 +92,7 @@ class LiveReference {
   void edited(const Edit& edit) noexcept { (void)edits_.push(edit); }
 
   // ---- one reader ----
-  bool next(ForceAtRest& found) noexcept { return found_.pop(found); }
+  [[nodiscard]] ForcesAtRest& found() noexcept { return found_; }
 
  private:
   // Ticks, edits and results that may wait: 4 s of ticks at 1 kHz.
@@ -99,7 +104,7 @@ class LiveReference {
   ReferenceSession session_;
   SpscRing<PassedTick> passed_{kTicksWaiting};
   SpscRing<Edit> edits_{kEditsWaiting};
-  SpscRing<ForceAtRest> found_{kResultsWaiting};
+  ForcesAtRest found_{kResultsWaiting};
   std::vector<PassedTick> way_;
   std::optional<Edit> waiting_;  // the next edit, of a later tick
   std::atomic<bool> stop_{false};

@@ -135,9 +135,8 @@ class Player {
   // Begins or ends it. Call it as change_scene(). It begins anew with each change of the scene and on the way
   // back. Returns why it cannot begin, or nothing.
   std::string compare_with_rest(bool on);
-  [[nodiscard]] bool compares_with_rest() const noexcept { return reference_ != nullptr; }
-  // The next result, if there is one. Only the window's thread may call it.
-  bool next_at_rest(ForceAtRest& found) noexcept { return reference_ != nullptr && reference_->next(found); }
+  // The results; null if there is no comparison. Only the window's thread may call it.
+  [[nodiscard]] ForcesAtRest* at_rest() noexcept { return reference_ ? &reference_->found() : nullptr; }
 
   // The thread that relaxes the tissue of the present scene, for a session that went live.
   [[nodiscard]] std::unique_ptr<RelaxationThread> relaxation_thread(double surfaces_hz);

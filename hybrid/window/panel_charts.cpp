@@ -25,6 +25,7 @@ constexpr std::array<glm::vec3, kForceSeries> kSeries{{{0.03F, 0.38F, 0.93F},
                                                        {0.90F, 0.62F, 0.00F}}};
 constexpr std::array<const char*, kForceSeries> kSeriesNames{
     "total", "rigid", "soft", "friction", "damping, texture", "limits", "passivity"};
+constexpr glm::vec3 kAtRest{0.70F, 0.70F, 0.78F};  // band of the force at rest
 constexpr std::size_t kAlways = 3;  // the first series are always named; the others if they occur
 // A part that stays below this share of the chart's height does not occur.
 constexpr double kLeastShown = 0.005;
@@ -105,6 +106,40 @@ void draw_series(const Pen& pen, const ChartBox& box, const TickHistory& history
   }
 }
 
+// Where in the chart is the force at rest? A band of one just noticeable difference on either side. It has
+// gaps where no force at rest was found for kLongestGap_s.
+void draw_at_rest(const Pen& pen, const ChartBox& box, const TickHistory& history, double top_N) {
+  constexpr double kLongestGap_s = 0.25;
+  const auto& forces = history.at_rest();
+  const Ink ink = ink_of(kAtRest);
+  const auto x_of = [&](double t_s) {
+    return box.right -
+           static_cast<float>((history.end_s() - t_s) / history.seconds()) * (box.right - box.left);
+  };
+  const auto y_of = [&](double force_N) {
+    return box.bottom - static_cast<float>(std::clamp(force_N / top_N, 0.0, 1.0)) * (box.bottom - box.top);
+  };
+  for (std::size_t n = 1; n < forces.size(); ++n) {
+    const ForceAtRest &from = forces[n - 1], &to = forces[n];
+    const double gap_s = to.t_s - from.t_s;
+    if (gap_s > kLongestGap_s) continue;
+    for (float x = std::max(x_of(from.t_s), box.left); x < x_of(to.t_s); x += 1.0F) {
+      const double share = static_cast<double>((x - x_of(from.t_s)) / (x_of(to.t_s) - x_of(from.t_s)));
+      const double force_N = std::lerp(glm::length(from.at_rest_N), glm::length(to.at_rest_N), share);
+      const double half_N = std::lerp(from.noticeable_N, to.noticeable_N, share);
+      pen.fill({x, y_of(force_N + half_N)}, {x + 1.0F, y_of(force_N - half_N)}, ink);
+    }
+  }
+}
+
+// The difference from the force at rest: of the newest force at rest, and the largest in the chart.
+std::string words_at_rest(const TickHistory& history) {
+  double most_jnd = 0.0;
+  for (const ForceAtRest& found : history.at_rest()) most_jnd = std::max(most_jnd, found.jnd());
+  return "at rest ± 1 JND; off by " + with_decimals(history.at_rest().back().jnd(), 1) + ", at most " +
+         with_decimals(most_jnd, 1) + " JND";
+}
+
 }  // namespace
 
 void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history) {
@@ -114,7 +149,8 @@ void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory&
   const double top_N = axis_end(history.most_N());
   const std::string top = force_text(top_N);
   const std::vector<ForceSeries> shown = shown_series(history, top_N);
-  const float keys = shown.size() > kAlways ? kKeyRow : 0.0F;
+  const bool at_rest = !history.at_rest().empty();
+  const float keys = kKeyRow * ((shown.size() > kAlways ? 1.0F : 0.0F) + (at_rest ? 1.0F : 0.0F));
   const ChartBox box{x0 + pen.width(top) + 0.5F * em, x1, y0 + (1.7F + keys) * em, y1 - 1.5F * em};
   for (int line = 0; line <= 2; ++line) {
     const float y = box.bottom - 0.5F * static_cast<float>(line) * (box.bottom - box.top);
@@ -123,6 +159,13 @@ void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory&
     pen.text(box.left - 0.5F * em - pen.width(words), y - 0.6F * em, pen.inks.pale, words);
   }
   draw_keys(pen, box.right, y0, shown);
+  if (at_rest) {
+    const std::string words = words_at_rest(history);
+    const float x = box.right - pen.width(words), y = box.top - (1.7F - 0.35F) * em;
+    pen.text(x, y, pen.inks.text, words);
+    pen.fill({x - 0.9F * em, y + 0.3F * em}, {x - 0.3F * em, y + 0.9F * em}, ink_of(kAtRest), 1.0F);
+    draw_at_rest(pen, box, history, top_N);
+  }
   for (const ForceSeries series : shown) draw_series(pen, box, history, series, top_N);
   const std::string from = "-" + with_decimals(history.seconds(), 0) + " s", to = "now";
   pen.text(box.left, box.bottom + 0.3F * em, pen.inks.pale, from);

@@ -419,7 +419,12 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     if (open_section("View")) draw_view(pen, scene, frame, result);
     Pen chart = pen;
     chart.list = ImGui::GetWindowDrawList();
-    if (open_section("Force")) draw_force_chart(chart, take_place(kForceChart_em * pen.em), frame.history);
+    if (open_section("Force")) {
+      bool rest = frame.state.compares_with_rest;
+      if (has_soft(scene) && tick_box("compare with the force at rest", rest))
+        result.actions.push_back({.verb = ViewVerb::rest, .numbers = {rest ? 1.0 : 0.0}});
+      draw_force_chart(chart, take_place(kForceChart_em * pen.em), frame.history);
+    }
     if (open_section("Ticks")) {
       const TickTimes times = frame.history.times();
       draw_tick_times(chart, take_place(kTickChart_em * pen.em), times);

@@ -52,6 +52,12 @@ void TickHistory::add(const TickSample& sample) {
     samples_.pop_front();
 }
 
+void TickHistory::add(const ForceAtRest& found) {
+  if (!at_rest_.empty() && found.t_s <= at_rest_.back().t_s) at_rest_.clear();
+  at_rest_.push_back(found);
+  while (at_rest_.front().t_s <= end_s() - seconds_) at_rest_.pop_front();
+}
+
 std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series, std::size_t count) const {
   std::vector<std::optional<ColumnRange>> columns(count);
   if (count == 0) return columns;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "hybrid/reference/live_reference.h"
 #include "hybrid/snapshot/tick_sample.h"
 
 namespace hybrid {
@@ -48,8 +49,12 @@ class TickHistory {
 
   // Adds a tick. A time that is not later than the last one begins a new history.
   void add(const TickSample& sample);
+  // Adds the force at rest of a tick. The times of such forces must increase.
+  void add(const ForceAtRest& found);
+  [[nodiscard]] const std::deque<ForceAtRest>& at_rest() const { return at_rest_; }
   void clear() {
     samples_.clear();
+    at_rest_.clear();
     mark_.reset();
   }
   // Marks a change of the scene. It replaces an earlier mark.
@@ -71,6 +76,7 @@ class TickHistory {
  private:
   double seconds_;
   std::deque<TickSample> samples_;
+  std::deque<ForceAtRest> at_rest_;
   std::optional<ChangeMark> mark_;
 };
 

@@ -42,9 +42,10 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 33> kScriptCommands{
+constexpr std::array<ScriptCommand, 34> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
+     {"rest", ViewVerb::rest, ScriptArguments::on_or_off, "rest on"},
      {"speed", ViewVerb::speed, ScriptArguments::number, "speed 0.1"},
      {"restart", ViewVerb::restart, ScriptArguments::none, "restart"},
      {"edit", ViewVerb::edit, ScriptArguments::edit, "edit tool stiffness 600"},

@@ -84,6 +84,9 @@ void act_on_session(ViewState& state, const ViewAction& action) {
       state.paused = true;
       ++state.single_ticks;
       break;
+    case ViewVerb::rest:
+      set_or_flip(state.compares_with_rest, action);
+      break;
     case ViewVerb::speed:
       state.speed = std::clamp(number_of(action, 1.0), kLeastSpeed, 1.0);
       break;

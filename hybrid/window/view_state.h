@@ -16,6 +16,7 @@ namespace hybrid {
 enum class ViewVerb : std::uint8_t {
   pause,           // numbers: 1 on, 0 off, none: toggle
   step,            // does one tick while paused
+  rest,            // numbers: 1 compares with the force at rest, 0 ends it, none: toggle
   speed,           // numbers: simulated time over real time
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
@@ -63,7 +64,7 @@ struct ViewState {
   std::uint32_t selected = Edit::kTool;
   bool moves = false;  // arrows on the selected object are shown
   // ---- requests to the session; the owner of the session takes counters and lists ----
-  bool paused = false;
+  bool paused = false, compares_with_rest = false;
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;
   double back_s = 0.0;  // how far before now the shown state is; the session pauses meanwhile; 0: the present

@@ -390,9 +390,11 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   return true;
 }
 
-void Window::add_ticks(TickSamples& samples) {
+void Window::add_ticks(TickSamples& samples, ForcesAtRest* at_rest) {
   TickSample sample;
   while (samples.pop(sample)) state_->history.add(sample);
+  ForceAtRest found;
+  while (at_rest != nullptr && at_rest->pop(found)) state_->history.add(found);
 }
 
 void Window::act(const ViewAction& action) {
@@ -413,6 +415,7 @@ WindowInput Window::take_input() {
   return {.dragged_goal_m = s.goal_m,
           .paused = s.user.paused,
           .wants_presses = s.wants_presses,
+          .compares_with_rest = s.user.compares_with_rest,
           .speed = s.user.speed,
           .restarts = s.user.restarts,
           .single_ticks = s.user.single_ticks,

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "hybrid/reference/live_reference.h"
 #include "hybrid/snapshot/snapshot.h"
 #include "hybrid/view/camera.h"
 #include "hybrid/window/panels.h"
@@ -30,6 +31,7 @@ struct WindowInput {
   std::optional<glm::dvec3> dragged_goal_m;
   bool paused = false;
   bool wants_presses = false;  // the frame shows Snapshot::presses
+  bool compares_with_rest = false;
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
   double back_s = 0.0;                           // as ViewState::back_s
@@ -67,8 +69,8 @@ class Window {
   // false if the user closed the window. Throws std::runtime_error if the driver fails or the window is lost.
   bool frame(const Snapshot& snapshot, const SessionNotes& notes = {});
 
-  // Adds every tick since the last frame, for the charts.
-  void add_ticks(TickSamples& samples);
+  // Adds every tick since the last frame, and every force at rest, for the charts. `at_rest`: null for none.
+  void add_ticks(TickSamples& samples, ForcesAtRest* at_rest = nullptr);
   // Does an action of a script in the next frame.
   void act(const ViewAction& action);
   // Returns the input since the last call.

@@ -16,7 +16,7 @@ struct KeyAction {
   std::string_view text{};
   double number = -1.0;  // negative: none
 };
-constexpr std::array<KeyAction, 29> kKeyActions{
+constexpr std::array<KeyAction, 30> kKeyActions{
     {{"space", ViewVerb::pause},      {"n", ViewVerb::step},
      {"r", ViewVerb::restart},        {"1", ViewVerb::speed, {}, 1.0},
      {"2", ViewVerb::speed, {}, 0.1}, {"3", ViewVerb::speed, {}, 0.01},
@@ -31,7 +31,7 @@ constexpr std::array<KeyAction, 29> kKeyActions{
      {"h", ViewVerb::panels},         {"i", ViewVerb::inset},
      {"p", ViewVerb::screenshot},     {"w", ViewVerb::save_recording},
      {"l", ViewVerb::reload},         {"s", ViewVerb::save_scene},
-     {"escape", ViewVerb::quit}}};
+     {"e", ViewVerb::rest},           {"escape", ViewVerb::quit}}};
 // Keys that only the panel understands.
 constexpr std::array<std::string_view, 14> kPanelKeys{"tab",    "left",      "right", "up",   "down",
                                                       "pageup", "pagedown",  "home",  "end",  "insert",

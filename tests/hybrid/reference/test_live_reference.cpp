@@ -86,7 +86,7 @@ TEST_F(LiveReferenceOf, TissueFindsTheErrorOfASlowRun) {
       asked += passed[n - 1].soft ? 1 : 0;
       if (!answer) continue;
       EXPECT_EQ(answer->t_s, passed[n - 1].t_s);
-      found.push_back(answer->jnd);
+      found.push_back(answer->jnd());
       truth.push_back(slow_jnd[n - 1]);
     }
     EXPECT_GT(static_cast<double>(found.size()), 0.8 * asked);
@@ -120,9 +120,9 @@ TEST_F(LiveReferenceOf, TissueTakesEdits) {
     last.coupling_N = tests::coupling(touch.at(last.device_m));
     reference.passed(last);
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    while (reference.next(found)) rests = found.t_s > passed.back().t_s && found.jnd < 0.1;
+    while (reference.found().pop(found)) rests = found.t_s > passed.back().t_s && found.jnd() < 0.1;
   }
-  EXPECT_TRUE(rests) << found.jnd;
+  EXPECT_TRUE(rests) << found.jnd();
   EXPECT_GT(glm::length(found.at_rest_N), 0.1);
 }
 
