@@ -233,9 +233,8 @@ void Renderer::State::copy_rigid_layer(const RigidLayer& rigid, const PixelRect&
   cover.draw();
 }
 
-// The layer has only the nearest rigid surface. Beside the tool this surface is drawn thin, so that things
-// behind it are visible. Other rigid surfaces may lie there. So within the disc rigid surfaces are drawn one
-// by one.
+// The layer has only the nearest rigid surface. Beside the tool this surface is drawn thin, so that rigid
+// surfaces behind it are visible. So within the disc all rigid surfaces are drawn, one by one.
 void Renderer::State::draw_behind_disc(const glm::mat4& placed_disc, const PixelRect& pixels) {
   const auto part = part_with_disc(clip, placed_disc, pixels);
   if (!part) return;
