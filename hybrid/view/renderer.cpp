@@ -63,9 +63,8 @@ void Renderer::State::copy_rigid_layer(const RenderedView& from) {
   cover.draw();
 }
 
-// The layer has only the nearest rigid surface. Beside the tool this surface is drawn thin, so that things
-// behind it are visible. Other rigid surfaces may lie there. So within the disc rigid surfaces are drawn one
-// by one.
+// The layer has only the nearest rigid surface. Beside the tool this surface is drawn thin, so that rigid
+// surfaces behind it are visible. So within the disc all rigid surfaces are drawn, one by one.
 void Renderer::State::draw_behind_disc(const RenderedView& to, const glm::mat4& placed_disc) {
   const Ball around{glm::vec3(placed_disc[3]), glm::length(glm::vec3(placed_disc[0]))};
   const PixelRect whole = part, behind = common(covered_by(around, projection()), whole);
