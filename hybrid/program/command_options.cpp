@@ -109,9 +109,10 @@ void add_study(CLI::App& app, int& status) {
   c->command_line = typed_command();
   StudyOptions& o = c->options;
   sub->add_option("SCANS", c->scans, "volumes, folders of a DICOM series, and folders of these")->required();
-  auto* labels = sub->add_option("--labels", c->labels,
-                                 "label volumes and folders of them; each belongs to the scan whose name its "
-                                 "own name begins with, or beside which it lies");
+  auto* labels =
+      sub->add_option("--labels", c->labels,
+                      "label volumes and folders of them; each belongs to the scan whose name its own name "
+                      "begins with, or beside which it lies. NAME=FILE: to the scan of this name");
   sub->add_option("--out", o.out, "folder to write; finished scans in it are not judged again")->required();
   add_tissue_options(*sub, o.compose, labels);
   auto* tune = sub->add_flag("--tune", o.tune, "also choose settings for each scene; takes minutes for each");

@@ -127,6 +127,7 @@ Record played(const Scene& as_read, const Record& presses, const Progress& progr
   const auto worst = static_cast<std::size_t>(std::max(0.0, error.all.worst_t_s / result.dt_s));
   return {{"ticks", result.ticks},
           {"contact_ticks", result.contact_ticks},
+          {"seconds", static_cast<double>(result.ticks) * result.dt_s},
           {"tick_us", {tick.p50, tick.p99, tick.p999, tick.max}},
           {"not_measured", error.not_measured},
           {"error_jnd", {error.p99_jnd, error.moving.max_jnd, error.still.max_jnd}},
@@ -145,6 +146,7 @@ void take(const Record& record, JudgedScan& judged) {
   SessionFigures& session = judged.session;
   record.at("ticks").get_to(session.ticks);
   record.at("contact_ticks").get_to(session.contact_ticks);
+  record.at("seconds").get_to(session.seconds);
   const Record& tick = record.at("tick_us");
   session.tick_us = {tick.at(0).get<double>(), tick.at(1).get<double>(), tick.at(2).get<double>(),
                      tick.at(3).get<double>()};
@@ -186,6 +188,7 @@ TunedScan tuned(const Scene& as_read, const StudyOptions& options, const fs::pat
                                (folder / "cache").string(), options.quick ? " --quick" : "");
     page.version = page.data.value("version", "");
     page.machine = page.data.value("machine", "");
+    require_writable(folder / "tune" / kPageFile);  // makes the folder
     save_page(folder / "tune", page);
   } catch (const std::exception& error) {
     out.not_tuned = error.what();

@@ -30,6 +30,7 @@ struct StudyOptions {
 // Force of the session against the same session played slowly.
 struct SessionFigures {
   std::uint64_t ticks = 0, contact_ticks = 0;
+  double seconds = 0.0;  // of the session
   Percentiles tick_us{};
   std::string not_measured{};  // why there is no error: nothing soft was felt; empty if there is one
   double p99_jnd = 0.0, moving_max_jnd = 0.0, still_max_jnd = 0.0;

@@ -12,6 +12,7 @@
 
 #include "hybrid/base/file_ending.h"
 #include "hybrid/compose/write_folder.h"
+#include "hybrid/scene/table_reader.h"
 
 namespace hybrid {
 namespace {
@@ -148,6 +149,42 @@ std::vector<std::vector<fs::path>> labels_of_scans(const std::vector<fs::path>& 
   return owned;
 }
 
+// Labels that the user gave by the name of a row.
+struct NamedLabels {
+  std::string name;
+  fs::path file;
+};
+
+// Takes the entries NAME=FILE out of `labels`. The name of a file may contain '=', too.
+std::vector<NamedLabels> named_among(const std::vector<std::string>& labels, std::vector<fs::path>& rest) {
+  std::vector<NamedLabels> named;
+  for (const std::string& text : labels) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || fs::exists(text)) {
+      rest.emplace_back(text);
+      continue;
+    }
+    named.push_back({text.substr(0, equals), text.substr(equals + 1)});
+    if (!fs::exists(named.back().file))
+      throw std::runtime_error(fmt::format("{}: there is no such file", named.back().file.string()));
+  }
+  return named;
+}
+
+void give_named(const std::vector<NamedLabels>& named, std::vector<ScanPair>& pairs) {
+  for (const NamedLabels& given : named) {
+    const auto found = std::ranges::find(pairs, given.name, &ScanPair::name);
+    if (found == pairs.end()) {
+      std::vector<std::string_view> known;
+      for (const ScanPair& pair : pairs) known.push_back(pair.name);
+      throw std::runtime_error(fmt::format("--labels {}={}: no scan has this name; the nearest is \"{}\"",
+                                           given.name, given.file.string(), nearest_name(given.name, known)));
+    }
+    found->labels = given.file;
+    found->unpaired.clear();
+  }
+}
+
 void take_labels(ScanPair& pair, const std::vector<fs::path>& owned, std::size_t given) {
   const auto exact = std::ranges::find_if(
       owned, [&](const fs::path& file) { return stem_of_volume(file) == stem_of_scan(pair.scan); });
@@ -157,24 +194,30 @@ void take_labels(ScanPair& pair, const std::vector<fs::path>& owned, std::size_t
     pair.labels = owned.front();
   } else if (owned.empty()) {
     pair.unpaired = fmt::format(
-        "none of the {} label volumes belongs to it by name; call it {}_labels.nii.gz, for example", given,
-        stem_of_scan(pair.scan));
+        "none of the {} label volumes belongs to it by name; say --labels {}=FILE, or call the file "
+        "{}_labels.nii.gz",
+        given, stem_of_scan(pair.scan), stem_of_scan(pair.scan));
   } else {
-    pair.unpaired = fmt::format("{} label volumes belong to it by name, {} and {} among them; give one",
-                                owned.size(), owned[0].filename().string(), owned[1].filename().string());
+    pair.unpaired = fmt::format(
+        "{} label volumes belong to it by name, {} and {} among them; say --labels {}=FILE", owned.size(),
+        owned[0].filename().string(), owned[1].filename().string(), stem_of_scan(pair.scan));
   }
 }
 
 }  // namespace
 
-std::vector<ScanPair> pair_scans(const std::vector<fs::path>& scans, const std::vector<fs::path>& labels) {
-  const std::vector<fs::path> all = volumes_of(scans, true), segmented = volumes_of(labels, false);
+std::vector<ScanPair> pair_scans(const std::vector<fs::path>& scans, const std::vector<std::string>& labels) {
+  std::vector<fs::path> unnamed;
+  const std::vector<NamedLabels> named = named_among(labels, unnamed);
+  const std::vector<fs::path> all = volumes_of(scans, true);
+  const std::vector<fs::path> segmented = volumes_of(unnamed, false);
   if (all.empty()) throw std::runtime_error("no volume and no DICOM series in the folders of the scans");
-  if (!labels.empty() && segmented.empty()) throw std::runtime_error("no volume in the folders of --labels");
+  if (!unnamed.empty() && segmented.empty()) throw std::runtime_error("no volume in the folders of --labels");
   std::vector<fs::path> images;
   for (const fs::path& file : all) {
+    const auto same = [&](const fs::path& other) { return fs::equivalent(file, other); };
     const bool is_label =
-        std::ranges::any_of(segmented, [&](const fs::path& other) { return fs::equivalent(file, other); });
+        std::ranges::any_of(segmented, same) || std::ranges::any_of(named, same, &NamedLabels::file);
     if (!is_label) images.push_back(file);
   }
   std::vector<ScanPair> pairs;
@@ -184,10 +227,11 @@ std::vector<ScanPair> pair_scans(const std::vector<fs::path>& scans, const std::
     const auto owned = labels_of_scans(images, segmented);
     for (std::size_t n = 0; n < images.size(); ++n) {
       pairs.push_back({.scan = images[n]});
-      if (!segmented.empty()) take_labels(pairs.back(), owned[n], segmented.size());
+      if (!labels.empty()) take_labels(pairs.back(), owned[n], segmented.size());
     }
   }
   name_them(pairs);
+  give_named(named, pairs);
   std::ranges::sort(pairs, {}, &ScanPair::name);
   return pairs;
 }

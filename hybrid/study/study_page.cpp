@@ -36,12 +36,6 @@ std::vector<PageCell> scan_cells(const StudiedScan& scan, bool tuned) {
                               number(whole, s.session.tick_us.p50, 1),
                               number(whole, s.session.tick_us.p99, 0),
                               number(whole, s.session.tick_us.p999, 0),
-                              number(whole, 1e-6 * static_cast<double>(s.memory_bytes), 0),
-                              number(whole, s.load_s, 1),
-                              number(whole, static_cast<double>(s.soft_voxels), 0),
-                              text(whole, fmt::format("{} of {}", s.soft_on_patches, s.soft_objects)),
-                              number(whole, static_cast<double>(s.rigid_objects), 0),
-                              number(whole, s.session.max_force_N, 2),
                               {.text = outlier_cell(scan)}};
   if (!tuned) return cells;
   const bool chosen = s.tuned && s.tuned->not_tuned.empty();
@@ -52,18 +46,37 @@ std::vector<PageCell> scan_cells(const StudiedScan& scan, bool tuned) {
 }
 
 PageTable scans_table(const Study& study) {
-  PageTable table{
-      .name = "scans",
-      .caption = "Failed scans first, then by how far error or tick are beyond their bounds",
-      .head = {"scan", "verdict", "error 99 % (JND)", "moving largest (JND)", "still largest (JND)",
-               "largest error near", "tick median (µs)", "tick 99 % (µs)", "tick 99.9 % (µs)", "memory (MB)",
-               "load (s)", "soft voxels", "soft objects on patches", "rigid objects", "largest force (N)",
-               "far above the median"},
-      .rows = {}};
+  PageTable table{.name = "scans",
+                  .caption = "Failed scans first, then by how far error or tick are beyond their bounds",
+                  .head = {"scan", "verdict", "error 99 % (JND)", "moving largest (JND)",
+                           "still largest (JND)", "largest error near", "tick median (µs)", "tick 99 % (µs)",
+                           "tick 99.9 % (µs)", "far above the median"},
+                  .rows = {}};
   const bool tuned = any_tuned(study);
   if (tuned)
     table.head.insert(table.head.end(), {"chosen setting", "its error (JND)", "its tick 99.9 % (µs)"});
   for (const StudiedScan& scan : study.scans) table.rows.push_back(scan_cells(scan, tuned));
+  return table;
+}
+
+PageTable sizes_table(const Study& study) {
+  PageTable table{.name = "sizes",
+                  .caption = "Scenes of the scans that did not fail",
+                  .head = {"scan", "memory (MB)", "load (s)", "soft voxels", "soft objects on patches",
+                           "rigid objects", "path (s)", "largest force (N)"},
+                  .rows = {}};
+  for (const StudiedScan& scan : study.scans) {
+    const JudgedScan& s = scan.judged;
+    if (!s.failed.empty()) continue;
+    table.rows.push_back({{.text = s.pair.name},
+                          number_cell(1e-6 * static_cast<double>(s.memory_bytes), 0),
+                          number_cell(s.load_s, 1),
+                          count_cell(s.soft_voxels),
+                          {.text = fmt::format("{} of {}", s.soft_on_patches, s.soft_objects)},
+                          count_cell(s.rigid_objects),
+                          number_cell(s.session.seconds, 1),
+                          number_cell(s.session.max_force_N, 2)});
+  }
   return table;
 }
 
@@ -103,10 +116,11 @@ PageTable sources_table(const Study& study) {
 }
 
 PageTable choices_table(const Study& study) {
-  PageTable table{.name = "choices",
-                  .caption = "What `tune` chose for each scene; its page lies in the scan's folder, in tune/",
-                  .head = {"scan", "choice and reason"},
-                  .rows = {}};
+  PageTable table{
+      .name = "choices",
+      .caption = "The choice of hybrid tune for each scene; its page lies in the scan's folder, in tune/",
+      .head = {"scan", "choice and reason"},
+      .rows = {}};
   for (const StudiedScan& scan : study.scans) {
     const auto& tuned = scan.judged.tuned;
     if (!tuned || !tuned->not_tuned.empty()) continue;
@@ -160,7 +174,7 @@ Page study_page(const Study& study, const std::string& title) {
       .verdict = study_verdict(study),
       .mark = all_good ? PageMark::good : PageMark::bad,
       .summary = {"Each scan was composed into a scene, and the scene's own path was played once, as by "
-                  "`hybrid run`. Errors are differences of the soft force from that of the same path "
+                  "hybrid run. Errors are differences of the soft force from that of the same path "
                   "played slowly, so that tissue has time to come to rest.",
                   outliers_meaning(study)}};
   PageSection scans{.heading = "Scans", .parts = {}};
@@ -179,6 +193,7 @@ Page study_page(const Study& study, const std::string& title) {
     if (!table.rows.empty()) page.sections.push_back({.heading = heading, .parts = {std::move(table)}});
   };
   add("Settings", choices_table(study));
+  add("Sizes", sizes_table(study));
   add("Failures and faults", reasons_table(study));
   add("Sources", sources_table(study));
   return page;

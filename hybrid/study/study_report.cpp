@@ -56,6 +56,7 @@ std::string outlier_words(const StudiedScan& scan) {
 
 Json session_json(const SessionFigures& session) {
   Json j{{"ticks", session.ticks}, {"contact_ticks", session.contact_ticks}};
+  j["seconds"] = session.seconds;
   j["tick_us"] = to_json(session.tick_us);
   j["max_force_N"] = session.max_force_N;
   j["error"] = nullptr;
@@ -144,11 +145,13 @@ std::string study_verdict(const Study& study) {
   const std::size_t felt = among_whole([](const JudgedScan& s) { return !s.accurate(); });
   const std::size_t slow = among_whole([](const JudgedScan& s) { return !s.in_time(); });
   const std::size_t faulty = among_whole([](const JudgedScan& s) { return !s.faults.empty(); });
-  std::string text =
-      fmt::format("Of {} scans, {} {} felt with an error of at most {} JND, in time", study.scans.size(),
-                  count_of(study, [](const JudgedScan& s) { return s.good(); }),
-                  count_of(study, [](const JudgedScan& s) { return s.good(); }) == 1 ? "is" : "are",
-                  with_digits(study.error_jnd, 3));
+  const std::size_t good = count_of(study, [](const JudgedScan& s) { return s.good(); });
+  std::string text = fmt::format("Of {} {}, {} felt with an error of at most {} JND, in time",
+                                 study.scans.size(), study.scans.size() == 1 ? "scan" : "scans",
+                                 good == 0   ? "none is"
+                                 : good == 1 ? "1 is"
+                                             : fmt::format("{} are", good),
+                                 with_digits(study.error_jnd, 3));
   if (felt > 0) text += fmt::format("; {} felt with a larger error", scans_are(felt));
   if (slow > 0) text += fmt::format("; {} too slow", scans_are(slow));
   if (faulty > 0)

@@ -32,7 +32,7 @@ class PairScans : public tests::SceneFile {
   [[nodiscard]] std::vector<std::string> pairs(const std::vector<std::string>& scans,
                                                const std::vector<std::string>& labels) const {
     std::vector<std::string> found;
-    for (const ScanPair& pair : pair_scans(in_folder(scans), in_folder(labels))) {
+    for (const ScanPair& pair : pair_scans(in_folder(scans), strings(labels))) {
       std::string text = pair.name + ": " + below(pair.scan);
       if (!pair.labels.empty()) text += " + " + below(pair.labels);
       found.push_back(text);
@@ -43,6 +43,11 @@ class PairScans : public tests::SceneFile {
   [[nodiscard]] std::vector<fs::path> in_folder(const std::vector<std::string>& names) const {
     std::vector<fs::path> paths;
     for (const std::string& name : names) paths.push_back(folder_ / name);
+    return paths;
+  }
+  [[nodiscard]] std::vector<std::string> strings(const std::vector<std::string>& names) const {
+    std::vector<std::string> paths;
+    for (const std::string& name : names) paths.push_back((folder_ / name).string());
     return paths;
   }
   [[nodiscard]] std::string below(const fs::path& file) const {
@@ -58,7 +63,7 @@ TEST_F(PairScans, LabelsBesideScansInOneFolder) {
 
 TEST_F(PairScans, ANameIsNoBeginningOfALongerWord) {
   make({"in/case1.nrrd", "in/case10.nrrd", "seg/case10-seg.nrrd"});
-  const auto found = pair_scans(in_folder({"in"}), in_folder({"seg"}));
+  const auto found = pair_scans(in_folder({"in"}), strings({"seg"}));
   EXPECT_THAT(found[0].unpaired, HasSubstr("case1_labels.nii.gz"));
   EXPECT_EQ(found[1].labels.filename(), "case10-seg.nrrd");
 }
@@ -96,14 +101,29 @@ TEST_F(PairScans, OneScanTakesTheOnlyLabels) {
 TEST_F(PairScans, SeveralLabelsForOneScanAreRefusedByName) {
   make({"a.nii.gz", "a_bones.nii.gz", "a_organs.nii.gz", "b.nii.gz", "b_bones.nii.gz", "b.mha"});
   const auto found = pair_scans(in_folder({"a.nii.gz", "b.nii.gz"}),
-                                in_folder({"a_bones.nii.gz", "a_organs.nii.gz", "b_bones.nii.gz", "b.mha"}));
+                                strings({"a_bones.nii.gz", "a_organs.nii.gz", "b_bones.nii.gz", "b.mha"}));
   EXPECT_THAT(found[0].unpaired, HasSubstr("2 label volumes belong to it by name, a_bones.nii.gz"));
   EXPECT_EQ(found[1].labels.filename(), "b.mha");  // its very name
 }
 
+TEST_F(PairScans, LabelsByTheNameOfTheRow) {
+  make({"in/a.nii.gz", "in/b.nii.gz", "in/organs.nii.gz", "b_labels.nii.gz", "b_2=x.nii.gz"});
+  const std::string organs = (folder_ / "in/organs.nii.gz").string();
+  const auto found = pair_scans(in_folder({"in"}), {"a=" + organs, (folder_ / "b_labels.nii.gz").string()});
+  ASSERT_EQ(found.size(), 2U);  // the labels are no scan
+  EXPECT_EQ(found[0].labels, organs);
+  EXPECT_EQ(found[1].labels.filename(), "b_labels.nii.gz");
+  // The name counts more than that of the file; a file may have '=' in its name.
+  EXPECT_EQ(
+      pair_scans(in_folder({"in/b.nii.gz"}), {"b=" + organs, (folder_ / "b_2=x.nii.gz").string()})[0].labels,
+      organs);
+  EXPECT_THROW((void)pair_scans(in_folder({"in"}), {"c=" + organs}), std::runtime_error);
+  EXPECT_THROW((void)pair_scans(in_folder({"in"}), {"a=" + organs + "x"}), std::runtime_error);
+}
+
 TEST_F(PairScans, LabelsAlone) {
   make({"l/a.nii.gz", "l/b.nii.gz"});
-  const auto found = pair_scans(in_folder({"l"}), in_folder({"l"}));
+  const auto found = pair_scans(in_folder({"l"}), strings({"l"}));
   ASSERT_EQ(found.size(), 2U);
   EXPECT_THAT(found[0].scan.string(), IsEmpty());
   EXPECT_EQ(found[1].labels.filename(), "b.nii.gz");
@@ -129,7 +149,7 @@ TEST_F(PairScans, NothingToStudyIsRefused) {
   fs::create_directories(folder_ / "none");
   EXPECT_THROW((void)pair_scans(in_folder({"none"}), {}), std::runtime_error);
   EXPECT_THROW((void)pair_scans(in_folder({"missing.nii.gz"}), {}), std::runtime_error);
-  EXPECT_THROW((void)pair_scans(in_folder({"a.nii.gz"}), in_folder({"empty"})), std::runtime_error);
+  EXPECT_THROW((void)pair_scans(in_folder({"a.nii.gz"}), strings({"empty"})), std::runtime_error);
 }
 
 }  // namespace
