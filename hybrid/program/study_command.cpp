@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
@@ -22,11 +25,19 @@ int study(const StudyCommand& command) {
   ask_report(outputs, page);
   outputs.ask_json(command.json);
   options.progress = progress_on_terminal();
-  const device::StopOnSignal stop;  // after a signal, scans that are done stay in their folders
-  const Study result = study(options, [&](const JudgedScan& scan, std::size_t number) {
-    end_progress();
-    fmt::print(stderr, "{} of {}, {}\n", number, options.scans.size(), scan_words(scan));
-  });
+  std::vector<JudgedScan> judged;
+  std::optional<int> signal;
+  try {
+    const device::StopOnSignal stop;
+    study(options, [&](const JudgedScan& scan, std::size_t number) {
+      end_progress();
+      fmt::print(stderr, "{} of {}, {}\n", number, options.scans.size(), scan_words(scan));
+      judged.push_back(scan);
+    });
+  } catch (const device::StopAsked& asked) {
+    signal = asked.signal;
+  }
+  const Study result = arranged(std::move(judged), options.error_jnd);
   end_progress();
   nlohmann::ordered_json report = report_head("study");
   report["command_line"] = command.command_line;
@@ -36,6 +47,10 @@ int study(const StudyCommand& command) {
                report);
   fmt::print(outputs.words(), "{}", study_words(result));
   outputs.say_files();
+  if (signal) {
+    return outputs.say_stopped(*signal,
+                               fmt::format("{} of {} scans", result.scans.size(), options.scans.size()));
+  }
   const bool any =
       std::ranges::any_of(result.scans, [](const StudiedScan& scan) { return scan.judged.failed.empty(); });
   return outputs.failed() || !any ? 1 : 0;

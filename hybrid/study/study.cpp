@@ -68,21 +68,18 @@ Study arranged(std::vector<JudgedScan> scans, double error_jnd) {
   return study;
 }
 
-Study study(const StudyOptions& options, const std::function<void(const JudgedScan&, std::size_t)>& on_scan) {
-  std::vector<JudgedScan> judged;
+void study(const StudyOptions& options, const std::function<void(const JudgedScan&, std::size_t)>& on_scan) {
+  std::size_t number = 0;
   for (const ScanPair& pair : options.scans) {
+    ++number;
     StudyOptions own = options;
     if (options.progress) {
       own.progress = [&](const std::string& text) {
-        options.progress(
-            fmt::format("scan {} of {}, {}: {}", judged.size() + 1, options.scans.size(), pair.name, text));
+        options.progress(fmt::format("scan {} of {}, {}: {}", number, options.scans.size(), pair.name, text));
       };
     }
-    JudgedScan scan = judge_scan(pair, own);
-    if (on_scan) on_scan(scan, judged.size() + 1);
-    judged.push_back(std::move(scan));
+    on_scan(judge_scan(pair, own), number);
   }
-  return arranged(std::move(judged), options.error_jnd);
 }
 
 }  // namespace hybrid

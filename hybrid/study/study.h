@@ -28,10 +28,9 @@ struct Study {
   double error_jnd = 1.0;
 };
 
-// Judges all scans in turn. `on_scan` is called after each one, with its number from 1 on. Throws
-// device::StopAsked after a signal; scans that are done are kept in their folders.
-Study study(const StudyOptions& options,
-            const std::function<void(const JudgedScan&, std::size_t)>& on_scan = {});
+// Judges all scans in turn. Calls `on_scan` with each of them, and its number from 1 on. Throws
+// device::StopAsked after a signal; what is done stays in the folders of the scans.
+void study(const StudyOptions& options, const std::function<void(const JudgedScan&, std::size_t)>& on_scan);
 
 // Sorts the scans, and finds outliers.
 Study arranged(std::vector<JudgedScan> scans, double error_jnd);

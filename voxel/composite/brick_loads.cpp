@@ -9,6 +9,7 @@
 // stiff layer crosses the cell. So links and loads together are never less stiff than bricks of the softest
 // tissue, and cycles converge.
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "voxel/composite/brick_forces.h"
@@ -74,7 +75,9 @@ float least_share(const GridLevel& level, const Index3& cell, bool shared) noexc
 }
 
 // Nodes on the open sides of a patch are interpolated from the coarse level, and their loads act on its
-// nodes.
+// nodes. A node takes its share by its weight and by its stiffness: a node that barely touches the tissue
+// would move without bound under the load of stiff bricks. Nodes without stiffness, ghosts and anchors, count
+// as the stiffest of the others.
 void add_loads_of_sides(const GridLevel& fine, GridLevel& coarse, std::size_t a) noexcept {
   const auto& nodes = fine.nodes;
   const auto on_side = [&](std::size_t d, int i) { return i < nodes[d].first || i > nodes[d].last; };
@@ -85,16 +88,30 @@ void add_loads_of_sides(const GridLevel& fine, GridLevel& coarse, std::size_t a)
         const float load = fine.brick_load[a][fine.node(i, j, k)];
         if (load == 0.0F || (!side && !on_side(0, i))) continue;
         const Index3 at{i, j, k};
+        std::array<std::size_t, 8> to{};
+        std::array<float, 8> share{}, stiffness{};
+        float stiffest = 0.0F, sum = 0.0F;
         for (int corner = 0; corner < 8; ++corner) {
-          Index3 to{};
-          float share = load;
+          const std::size_t c = index(corner);
+          Index3 node{};
+          share[c] = 1.0F;
           for (std::size_t d = 0; d < 3; ++d) {
             const float after = nodes[d].weight_after[index(at[d])];
             const int up = corner >> d & 1;
-            to[d] = nodes[d].coarse[index(at[d])] + up;
-            share *= up != 0 ? after : 1.0F - after;
+            node[d] = nodes[d].coarse[index(at[d])] + up;
+            share[c] *= up != 0 ? after : 1.0F - after;
           }
-          if (share != 0.0F) coarse.brick_load[a][coarse.node(to[0], to[1], to[2])] += share;
+          if (share[c] == 0.0F) continue;
+          to[c] = coarse.node(node[0], node[1], node[2]);
+          for (const auto& diagonal : coarse.diagonal) stiffness[c] += diagonal[to[c]];
+          stiffest = std::max(stiffest, stiffness[c]);
+        }
+        for (std::size_t c = 0; c < 8; ++c) {
+          share[c] *= stiffness[c] > 0.0F ? stiffness[c] : stiffest > 0.0F ? stiffest : 1.0F;
+          sum += share[c];
+        }
+        for (std::size_t c = 0; c < 8; ++c) {
+          if (share[c] != 0.0F) coarse.brick_load[a][to[c]] += load * share[c] / sum;
         }
       }
     }

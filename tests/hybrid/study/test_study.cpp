@@ -59,9 +59,12 @@ TEST_F(StudyOfScans, FiguresAreThoseOfASessionAndAFailureIsARow) {
   save("labels/whole.nii.gz", block_on_bone());
   save("labels/empty.nii.gz", {});
   std::vector<std::string> done;
-  const hybrid::Study study = hybrid::study(of_labels(), [&](const JudgedScan& scan, std::size_t n) {
+  std::vector<JudgedScan> scans;
+  hybrid::study(of_labels(), [&](const JudgedScan& scan, std::size_t n) {
     done.push_back(std::to_string(n) + " " + scan.pair.name);
+    scans.push_back(scan);
   });
+  const hybrid::Study study = hybrid::arranged(scans, 1.0);
   EXPECT_THAT(done, ElementsAre("1 empty", "2 whole"));
   ASSERT_EQ(study.scans.size(), 2U);
   const JudgedScan &empty = study.scans[0].judged, &whole = study.scans[1].judged;
