@@ -31,9 +31,15 @@ void for_cells(const GridLevel& level, const Visit& visit) {
   }
 }
 
+// Can a node without a link along d bear loads along d? An anchor does, and a node that is no unknown moves
+// with others.
+bool holds_load(const GridLevel& level, std::size_t d, std::size_t n) noexcept {
+  return level.anchor_weight[d][n] > 0.0F || level.inverse_diagonal[d][n] == 0.0F;
+}
+
 // The least stiffness that one of a cell's twelve links has for the cell, relative to that of a full link of
-// the level. Links that anchors replace do not count. `shared`: the cells beside a link share it, those
-// beyond an open side of the patch included.
+// the level. Links that anchors replace do not count, if both ends can bear loads without them. `shared`: the
+// cells beside a link share it, those beyond an open side of the patch included.
 float least_share(const GridLevel& level, const Index3& cell, bool shared) noexcept {
   const float whole = 1.0F / static_cast<float>(level.step);
   float least = std::numeric_limits<float>::max();
@@ -46,8 +52,9 @@ float least_share(const GridLevel& level, const Index3& cell, bool shared) noexc
       const std::size_t n = level.node(at[0], at[1], at[2]);
       const float weight = level.weight[d][n];
       if (weight == 0.0F) {
-        if (level.anchor_weight[d][n] > 0.0F || level.anchor_weight[d][n + level.stride_along(d)] > 0.0F)
-          continue;
+        const std::size_t end = n + level.stride_along(d);
+        const bool anchored = level.anchor_weight[d][n] > 0.0F || level.anchor_weight[d][end] > 0.0F;
+        if (anchored && holds_load(level, d, n) && holds_load(level, d, end)) continue;
         return 0.0F;
       }
       int cells = 0;
