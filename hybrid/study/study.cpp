@@ -62,6 +62,9 @@ Study arranged(std::vector<JudgedScan> scans, double error_jnd) {
     }
   };
   find("error", [](const JudgedScan& s) { return std::max(s.session.p99_jnd, kLeastError_jnd); });
+  find("largest error", [](const JudgedScan& s) {
+    return std::max({s.session.moving_max_jnd, s.session.still_max_jnd, kLeastError_jnd});
+  });
   find("tick", [](const JudgedScan& s) { return s.session.tick_us.p999; });
   find("memory", [](const JudgedScan& s) { return static_cast<double>(s.memory_bytes); });
   find("load", [](const JudgedScan& s) { return s.load_s; });

@@ -13,7 +13,7 @@ namespace hybrid {
 
 // A figure of a scan that is far above those of the other scans.
 struct Outlier {
-  std::string figure{};  // "error", "tick", "memory", "load"
+  std::string figure{};  // "error", "largest error", "tick", "memory", "load"
   double times_median = 0.0;
 };
 
