@@ -103,7 +103,7 @@ int tune_scene(const TuneCommand& command);
 struct StudyCommand {
   std::vector<std::filesystem::path> scans;
   std::vector<std::string> labels;  // as of pair_scans()
-  StudyOptions options;  // without `scans`
+  StudyOptions options;             // without `scans`
   std::string json;
   std::string command_line;  // as it was typed
 };
