@@ -139,7 +139,11 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"bench", {"plot", "compare", "compose", "stress"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
         {"validate", {"page", "compare"}},
-        {"program", {"bench", "bench/reports", "bench/scenes", "stability", "validate", "window"}}}},
+        {"study", {"tune", "compose"}},
+        {"program/help", {"scene"}},
+        {"program",
+         {"bench", "bench/reports", "bench/scenes", "program/help", "stability", "study", "validate",
+          "window"}}}},
       {"interface", {{"", {}}, {"examples", {}}}},
   };
   return kRooms;

@@ -77,4 +77,55 @@ void add_compare(CLI::App& app, int& status) {
   });
 }
 
+void add_tissue_options(CLI::App& sub, ComposeOptions& options, CLI::Option* labels) {
+  sub.add_option("--names", options.names, "of --labels: what they are called (CSV: number, name; or JSON)")
+      ->needs(labels);
+  sub.add_option("--rigid", options.rigid,
+                 "of --labels: names, patterns (rib_*) and numbers, with commas between, that become rigid "
+                 "surfaces; or none. Default: bones, by their names")
+      ->delimiter(',')
+      ->needs(labels);
+  sub.add_option("--soft", options.soft,
+                 "of --labels: those that become tissue; or none. Default: all that is not bone")
+      ->delimiter(',')
+      ->needs(labels);
+  sub.add_option_function<std::vector<double>>(
+         "--range",
+         [&options](const std::vector<double>& v) {
+           options.range = {v.at(0), v.at(1)};
+         },
+         "intensities LO,HI that are tissue, of a volume without labels; default: above Otsu's threshold")
+      ->delimiter(',')
+      ->expected(2);
+  sub.add_option_function<double>(
+         "--spacing", [&options](double mm) { options.spacing_m = mm * 1e-3; },
+         "voxel size of tissue in mm; default: the file's, coarser above 1.5 million voxels of tissue")
+      ->check(CLI::PositiveNumber);
+}
+
+void add_study(CLI::App& app, int& status) {
+  auto* sub = app.add_subcommand(
+      "study", "Many segmented scans: composes, plays and judges each; a page over all, outliers first");
+  auto c = std::make_shared<StudyCommand>();
+  c->command_line = typed_command();
+  StudyOptions& o = c->options;
+  sub->add_option("SCANS", c->scans, "volumes, folders of a DICOM series, and folders of these")->required();
+  auto* labels =
+      sub->add_option("--labels", c->labels,
+                      "label volumes and folders of them; each belongs to the scan whose name its own name "
+                      "begins with, or beside which it lies. NAME=FILE: to the scan of this name");
+  sub->add_option("--out", o.out, "folder to write; finished scans in it are not judged again")->required();
+  add_tissue_options(*sub, o.compose, labels);
+  auto* tune = sub->add_flag("--tune", o.tune, "also choose settings for each scene; takes minutes for each");
+  sub->add_flag("--quick", o.quick, "of --tune: fewer settings and passes")->needs(tune);
+  sub->add_option("--budget-us", o.budget_us,
+                  "most microseconds of a tick's p99.9; default: half of the device's period")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--error-jnd", o.error_jnd, "error that may be felt: p99, in JND")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
+  sub->callback([c, &status] { status = study(*c); });
+}
+
 }  // namespace hybrid

@@ -15,7 +15,12 @@ std::string& typed_command();
 // The option --report.
 void add_report(CLI::App& sub, ReportRequest& report);
 
-// The command `compare`. It writes its exit status into `status` when it runs.
+// The commands `compare` and `study`. Each writes its exit status into `status` when it runs.
 void add_compare(CLI::App& app, int& status);
+void add_study(CLI::App& app, int& status);
+
+// Options of `compose` that say what becomes of labels and intensities: --names, --rigid, --soft, --range,
+// --spacing. The first three need `labels`.
+void add_tissue_options(CLI::App& sub, ComposeOptions& options, CLI::Option* labels);
 
 }  // namespace hybrid

@@ -12,6 +12,7 @@
 #include "hybrid/compare/compare_measured.h"
 #include "hybrid/compose/compose.h"
 #include "hybrid/session/black_box.h"
+#include "hybrid/study/judge_scan.h"
 
 namespace hybrid {
 
@@ -98,6 +99,15 @@ struct TuneCommand {
   std::string command_line;  // as it was typed; for the report
 };
 int tune_scene(const TuneCommand& command);
+
+struct StudyCommand {
+  std::vector<std::filesystem::path> scans;
+  std::vector<std::string> labels;  // as of pair_scans()
+  StudyOptions options;             // without `scans`
+  std::string json;
+  std::string command_line;  // as it was typed
+};
+int study(const StudyCommand& command);  // the exit status is 1 if every scan failed
 
 struct BenchCommand {
   std::vector<std::string> what;  // as typed: a suite, or scene files

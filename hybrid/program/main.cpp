@@ -15,9 +15,9 @@
 #include "hybrid/base/file_ending.h"
 #include "hybrid/program/command_options.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/did_you_mean.h"
+#include "hybrid/program/help/did_you_mean.h"
+#include "hybrid/program/help/program_pages.h"
 #include "hybrid/program/outputs.h"
-#include "hybrid/program/program_pages.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/scene/table_reader.h"
 
@@ -127,31 +127,9 @@ void add_compose(CLI::App& app, int& status) {
       "starter scene");
   sub->add_option("--out", o.out, "folder to write; scene.toml and the files that it reads")->required();
   auto* labels = sub->add_option("--labels", o.labels, "label volume of a segmentation");
-  sub->add_option("--names", o.names, "of --labels: what they are called (CSV: number, name; or JSON)")
-      ->needs(labels);
-  sub->add_option("--rigid", o.rigid,
-                  "of --labels: names, patterns (rib_*) and numbers, with commas between, that become rigid "
-                  "surfaces; or none. Default: bones, by their names")
-      ->delimiter(',')
-      ->needs(labels);
-  sub->add_option("--soft", o.soft,
-                  "of --labels: those that become tissue; or none. Default: all that is not bone")
-      ->delimiter(',')
-      ->needs(labels);
+  hybrid::add_tissue_options(*sub, o, labels);
   sub->add_option("--place", o.place, "where an input lies: NAME=x,y,z[,rx,ry,rz] (mm, degrees); repeatable")
       ->take_all();
-  sub->add_option_function<std::vector<double>>(
-         "--range",
-         [c](const std::vector<double>& v) {
-           c->options.range = {v.at(0), v.at(1)};
-         },
-         "intensities LO,HI that are tissue, of a volume without labels; default: above Otsu's threshold")
-      ->delimiter(',')
-      ->expected(2);
-  sub->add_option_function<double>(
-         "--spacing", [c](double mm) { c->options.spacing_m = mm * 1e-3; },
-         "voxel size of tissue in mm; default: the file's, coarser above 1.5 million voxels of tissue")
-      ->check(CLI::PositiveNumber);
   sub->add_flag("--force", o.force, "write over a scene that is there");
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   sub->callback([c, &status] { status = hybrid::compose(*c); });
@@ -403,6 +381,7 @@ int main(int argc, char** argv) {
   add_devices(app, status);
   hybrid::add_compare(app, status);
   add_tune(app, status);
+  hybrid::add_study(app, status);
   add_bench(app, status);
   add_stability(app, status);
   add_validate(app, status);

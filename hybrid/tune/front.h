@@ -26,6 +26,9 @@ std::optional<std::size_t> dominated_by(std::span<const CostAndError> points, st
 // The points that no other point dominates, by rising cost.
 std::vector<std::size_t> pareto_front(std::span<const CostAndError> points);
 
+// Default budget of a tick's p99.9, as a share of the device's period.
+inline constexpr double kBudgetShare = 0.5;
+
 struct Bounds {
   double error_jnd = 1.0;
   double budget_us = 500.0;

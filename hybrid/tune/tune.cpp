@@ -17,7 +17,6 @@
 namespace hybrid {
 namespace {
 
-constexpr double kBudgetShare = 0.5;       // default budget, as a share of the device's period
 constexpr double kFirstShare = 1.0 / 3.0;  // share of the contact that the first round plays
 // A setting is left out if another is better in cost and error by this margin: after the first round, and
 // after the second.

@@ -9,6 +9,7 @@
 // stiff layer crosses the cell. So links and loads together are never less stiff than bricks of the softest
 // tissue, and cycles converge.
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "voxel/composite/brick_forces.h"
@@ -30,9 +31,15 @@ void for_cells(const GridLevel& level, const Visit& visit) {
   }
 }
 
+// Can a node without a link along d bear loads along d? An anchor does, and a node that is no unknown moves
+// with others.
+bool holds_load(const GridLevel& level, std::size_t d, std::size_t n) noexcept {
+  return level.anchor_weight[d][n] > 0.0F || level.inverse_diagonal[d][n] == 0.0F;
+}
+
 // The least stiffness that one of a cell's twelve links has for the cell, relative to that of a full link of
-// the level. Links that anchors replace do not count. `shared`: the cells beside a link share it, those
-// beyond an open side of the patch included.
+// the level. Links that anchors replace do not count, if both ends can bear loads without them. `shared`: the
+// cells beside a link share it, those beyond an open side of the patch included.
 float least_share(const GridLevel& level, const Index3& cell, bool shared) noexcept {
   const float whole = 1.0F / static_cast<float>(level.step);
   float least = std::numeric_limits<float>::max();
@@ -45,8 +52,9 @@ float least_share(const GridLevel& level, const Index3& cell, bool shared) noexc
       const std::size_t n = level.node(at[0], at[1], at[2]);
       const float weight = level.weight[d][n];
       if (weight == 0.0F) {
-        if (level.anchor_weight[d][n] > 0.0F || level.anchor_weight[d][n + level.stride_along(d)] > 0.0F)
-          continue;
+        const std::size_t end = n + level.stride_along(d);
+        const bool anchored = level.anchor_weight[d][n] > 0.0F || level.anchor_weight[d][end] > 0.0F;
+        if (anchored && holds_load(level, d, n) && holds_load(level, d, end)) continue;
         return 0.0F;
       }
       int cells = 0;
@@ -74,7 +82,9 @@ float least_share(const GridLevel& level, const Index3& cell, bool shared) noexc
 }
 
 // Nodes on the open sides of a patch are interpolated from the coarse level, and their loads act on its
-// nodes.
+// nodes. A node takes its share by its weight and by its stiffness: a node that barely touches the tissue
+// would move without bound under the load of stiff bricks. Nodes without stiffness, ghosts and anchors, count
+// as the stiffest of the others.
 void add_loads_of_sides(const GridLevel& fine, GridLevel& coarse, std::size_t a) noexcept {
   const auto& nodes = fine.nodes;
   const auto on_side = [&](std::size_t d, int i) { return i < nodes[d].first || i > nodes[d].last; };
@@ -85,16 +95,30 @@ void add_loads_of_sides(const GridLevel& fine, GridLevel& coarse, std::size_t a)
         const float load = fine.brick_load[a][fine.node(i, j, k)];
         if (load == 0.0F || (!side && !on_side(0, i))) continue;
         const Index3 at{i, j, k};
+        std::array<std::size_t, 8> to{};
+        std::array<float, 8> share{}, stiffness{};
+        float stiffest = 0.0F, sum = 0.0F;
         for (int corner = 0; corner < 8; ++corner) {
-          Index3 to{};
-          float share = load;
+          const std::size_t c = index(corner);
+          Index3 node{};
+          share[c] = 1.0F;
           for (std::size_t d = 0; d < 3; ++d) {
             const float after = nodes[d].weight_after[index(at[d])];
             const int up = corner >> d & 1;
-            to[d] = nodes[d].coarse[index(at[d])] + up;
-            share *= up != 0 ? after : 1.0F - after;
+            node[d] = nodes[d].coarse[index(at[d])] + up;
+            share[c] *= up != 0 ? after : 1.0F - after;
           }
-          if (share != 0.0F) coarse.brick_load[a][coarse.node(to[0], to[1], to[2])] += share;
+          if (share[c] == 0.0F) continue;
+          to[c] = coarse.node(node[0], node[1], node[2]);
+          for (const auto& diagonal : coarse.diagonal) stiffness[c] += diagonal[to[c]];
+          stiffest = std::max(stiffest, stiffness[c]);
+        }
+        for (std::size_t c = 0; c < 8; ++c) {
+          share[c] *= stiffness[c] > 0.0F ? stiffness[c] : stiffest > 0.0F ? stiffest : 1.0F;
+          sum += share[c];
+        }
+        for (std::size_t c = 0; c < 8; ++c) {
+          if (share[c] != 0.0F) coarse.brick_load[a][to[c]] += load * share[c] / sum;
         }
       }
     }

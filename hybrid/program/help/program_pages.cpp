@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/program/program_pages.h"
+#include "hybrid/program/help/program_pages.h"
 
 #include <CLI/CLI.hpp>
 #include <sstream>

@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <sstream>
 
-#include "hybrid/program/program_pages.h"
+#include "hybrid/program/help/program_pages.h"
 
 namespace hybrid {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/program/did_you_mean.h"
+#include "hybrid/program/help/did_you_mean.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
