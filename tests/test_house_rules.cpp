@@ -132,7 +132,7 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"tune", {"compare", "page"}},
         {"models", {"tune"}},
         {"compose", {"session", "view"}},
-        {"window", {"view"}},
+        {"window", {"view", "reference"}},
         {"stress", {"session", "view"}},
         {"bench/reports", {}},
         {"bench/scenes", {"models"}},

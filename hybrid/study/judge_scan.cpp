@@ -26,7 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 using Record = nlohmann::json;
 
-constexpr int kMostCompared = 1'000'000;  // ticks, with the slow run; as by `hybrid run`
 
 // Changes when a file of the path is replaced or edited.
 std::string version_of(const fs::path& path) {
@@ -116,7 +115,7 @@ Record played(const Scene& as_read, const Record& presses, const Progress& progr
   for (const auto& object : built.state->soft) on_patches += object->uses_patches() ? 1 : 0;
   SessionOptions options;
   options.keep_recording = false;
-  options.reference_samples = kMostCompared;
+  options.measure_error = true;
   options.reference = Reference::quick;
   options.progress = progress;
   options.async_relaxation = true;

@@ -80,7 +80,7 @@ TEST_F(StudyOfScans, FiguresAreThoseOfASessionAndAFailureIsARow) {
   hybrid::BuiltScene built = hybrid::build_scene(scene);
   const hybrid::SessionResult session = hybrid::run_session(scene, built, [] {
     hybrid::SessionOptions options;
-    options.reference_samples = 1'000'000;
+    options.measure_error = true;
     options.async_relaxation = true;
     return options;
   }());
