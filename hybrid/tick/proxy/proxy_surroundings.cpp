@@ -14,8 +14,8 @@ namespace {
 // first kNarrow surveys may list only kMostOfGood times the target number. Those up to kCrowded list as many
 // as a neighbourhood usually holds. After that there must be the pole of a fan, where very many triangles
 // share a corner. Each kind of survey begins with the same margin.
-constexpr int kMaxShrinks = 22;
-constexpr int kNarrow = 2, kCrowded = 6;
+constexpr int kMaxShrinks = 23;
+constexpr int kNarrow = 3, kCrowded = 7;
 constexpr double kMostOfGood = 4.0;  // (unit: the target number)
 constexpr double kShrink = 0.125;
 constexpr double kCentreAhead = 0.6;  // distance from the proxy to the centre of a survey (unit: margin)
