@@ -51,9 +51,8 @@ void Neighbourhood::set_plane(std::uint32_t i, const SeparatingPlane& plane) noe
 }
 
 bool Neighbourhood::survey(const RigidSurface& surface, const glm::dvec3& centre, double margin,
-                           double radius, const glm::dvec3& view, bool crowded) noexcept {
-  std::span<ElementPlane> room(surveyed_);
-  if (!crowded && room.size() > kCapacity) room = room.first(kCapacity);
+                           double radius, const glm::dvec3& view, std::uint32_t most) noexcept {
+  const std::span<ElementPlane> room(surveyed_.data(), std::min<std::size_t>(most, surveyed_.size()));
   const GatherResult result = surface.survey(centre, radius + margin, view, room);
   if (!result.complete) {
     forget();

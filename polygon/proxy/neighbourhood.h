@@ -37,10 +37,9 @@ class Neighbourhood {
 
   // Finds every element that may come within `radius` of a ball's centre, for centres within `margin` of
   // `centre`. Their planes face `view`, which must be at least `radius` away from all elements (body frame).
-  // False if they are too many: ask again with a smaller margin. At the pole of a fan no margin is small
-  // enough; there `crowded` allows kCrowdedCapacity.
+  // False if there are more than `most` (at most kCrowdedCapacity): ask again with a smaller margin.
   bool survey(const RigidSurface& surface, const glm::dvec3& centre, double margin, double radius,
-              const glm::dvec3& view, bool crowded = false) noexcept;
+              const glm::dvec3& view, std::uint32_t most = kCapacity) noexcept;
   void forget() noexcept { margin_ = -1.0; }
 
   // Distance (unit: meter) that a ball's centre may move from `point` before it can touch an element that is

@@ -9,10 +9,14 @@
 namespace hybrid {
 namespace {
 
-// A survey that finds too many elements is repeated with the margin times kShrink, at most kMaxShrinks times.
-// After kCrowded repetitions there must be the pole of a fan, where very many triangles share a corner.
-constexpr int kMaxShrinks = 20;
-constexpr int kCrowded = 4;
+// A survey that finds too many elements ends, and is repeated with the margin times kShrink, at most
+// kMaxShrinks times. If the last survey found few elements, its margin may have grown in free space. Then the
+// first kNarrow surveys may list only kMostOfGood times the target number. Those up to kCrowded list as many
+// as a neighbourhood usually holds. After that there must be the pole of a fan, where very many triangles
+// share a corner. Each kind of survey begins with the same margin.
+constexpr int kMaxShrinks = 23;
+constexpr int kNarrow = 3, kCrowded = 7;
+constexpr double kMostOfGood = 4.0;  // (unit: the target number)
 constexpr double kShrink = 0.125;
 constexpr double kCentreAhead = 0.6;  // distance from the proxy to the centre of a survey (unit: margin)
 // Height above the surface at which a ball's survey is centred (unit: margin), but at most the ball's radius.
@@ -22,9 +26,9 @@ constexpr double kLift = 4.0;
 // Target number of elements in a survey. Fewer are soon left behind, more take long to read. A ball has more
 // elements in contact range than a point has.
 constexpr double kGoodCount = 16.0, kGoodUnderBall = 104.0;
-// The margin doubles for a longer way only below this count (unit: elements): the next count is at most four
-// times as large, and fits Neighbourhood::kCapacity.
-constexpr double kMostBeforeGrowth = 0.125 * polygon::Neighbourhood::kCapacity;
+// The margin doubles for a longer way only below this count (unit: elements). The next count is then at most
+// four times as large along a surface, which a narrow survey may hold.
+constexpr double kMostBeforeGrowth = 2.0 * kGoodCount;
 // Work, in elements listed: of a survey beside its elements; of a plane that is made anew. kPlanesOfWork:
 // number of planes that are read at the cost of one element.
 constexpr std::uint32_t kWorkOfSurvey = 32, kWorkOfPlane = 2, kPlanesOfWork = 64;
@@ -106,14 +110,17 @@ bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool mov
     work_ += kWorkOfSurvey;
     return near.near.survey(surface, view, apart, radius_, view);
   }
-  const double margin = near.margin_m;
-  for (int n = 0; n < kMaxShrinks; ++n) {
-    if (n == kCrowded) near.margin_m = margin;
+  const double margin = near.margin_m, good = good_count(margin);
+  for (int n = near.counted < good ? 0 : kNarrow; n < kMaxShrinks; ++n) {
+    if (n == kNarrow || n == kCrowded) near.margin_m = margin;
     if (n >= kCrowded && near.margin_m < smallest) break;
     const Reach reach = reach_of(near, view, moving);
-    const bool complete = near.near.survey(surface, reach.centre, reach.margin, radius_, view, n >= kCrowded);
+    const std::uint32_t most = n < kNarrow    ? static_cast<std::uint32_t>(kMostOfGood * good)
+                               : n < kCrowded ? polygon::Neighbourhood::kCapacity
+                                              : polygon::Neighbourhood::kCrowdedCapacity;
+    const bool complete = near.near.survey(surface, reach.centre, reach.margin, radius_, view, most);
     ++surveys_;
-    work_ += kWorkOfSurvey + (complete ? near.near.size() : polygon::Neighbourhood::kCapacity);
+    work_ += kWorkOfSurvey + (complete ? near.near.size() : most);
     if (complete) {
       adapt_margin(near);
       return true;
@@ -149,10 +156,15 @@ ProxySurroundings::Reach ProxySurroundings::reach_of(const RigidState& near, con
   return {view + ahead + lift * up, std::sqrt(margin * margin + lift * lift)};
 }
 
+// The target number of elements in a survey.
+double ProxySurroundings::good_count(double margin_m) const noexcept {
+  return kGoodCount + kGoodUnderBall * radius_ / (radius_ + margin_m);
+}
+
 // The margin of the next survey, so that it finds neither too few elements nor too many if it can.
 void ProxySurroundings::adapt_margin(RigidState& near) const noexcept {
   const double count = std::max(1.0, static_cast<double>(near.near.size()));
-  const double good = kGoodCount + kGoodUnderBall * radius_ / (radius_ + near.margin_m);
+  const double good = good_count(near.margin_m);
   const bool pole = count > good && count >= kPoleCount * near.counted &&
                     near.margin_m < kPoleMargin * near.margin_counted_m;
   near.counted = count;

@@ -82,6 +82,7 @@ class ProxySurroundings {
   [[nodiscard]] Reach reach_of(const RigidState& near, const glm::dvec3& view, bool moving) const noexcept;
   [[nodiscard]] std::uint64_t near_objects() noexcept;
   bool survey(std::uint32_t o, const glm::dvec3& view, bool moving) noexcept;
+  [[nodiscard]] double good_count(double margin_m) const noexcept;
   void adapt_margin(RigidState& near) const noexcept;
   void first_in_object(std::uint32_t o, const glm::dvec3& q, double part, std::span<const ProxyPlane> held,
                        ProxyPlane& first, double& soonest) noexcept;

@@ -3,6 +3,7 @@
 // outside everything, and later sweeps take it to the same place.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -112,6 +113,23 @@ TEST_P(SweepWork, IsBoundedInTapsAtTwoMetersASecond) {
     arrives(0.03 * to);
   }
   EXPECT_EQ(ball_.state().faults, 0U);
+}
+
+// Free space between two taps lets the range of a search grow. The landing must not list every element within
+// it.
+TEST_P(SweepWork, LandsWithFewElements) {
+  std::uint32_t most = 0;
+  for (int tap = 0; tap < 40; ++tap) {
+    const dvec3 from = glm::normalize(dvec3(std::cos(2.4 * tap), std::sin(2.4 * tap), 0.05 * tap - 1.0));
+    ASSERT_TRUE(ball_.start(0.07 * from));
+    for (int k = 1; k <= 13 && ball_.state().active_count == 0; ++k) {
+      const hybrid::Sweep sweep = ball_.sweep((0.07 - 0.002 * k) * from);
+      most = std::max(most, sweep.work);
+    }
+    ASSERT_GT(ball_.state().active_count, 0U);
+  }
+  // In units of elements listed. A ball of 2 mm touches many triangles of the finest mesh at once.
+  EXPECT_LE(most, (std::get<1>(GetParam()) > 0.0 ? 2 : 1) * Neighbourhood::kCapacity);
 }
 
 // At this speed no tick needs to be cut short, whatever the mesh.
