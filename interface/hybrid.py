@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["Editable", "Error", "ForceError", "Object", "Session", "TRACE", "version"]
 
-_ABI_VERSION = 1
+_ABI_VERSION = 2
 
 #: One tick: the rows of a trace. device_m, proxy_m: positions (m). force_N: on the hand, after its limits (N);
 #: rigid_N, soft_N: its parts before them. contact_count: objects in contact; contact_bits: bit n is object n.
