@@ -26,7 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 using Record = nlohmann::json;
 
-
 // Changes when a file of the path is replaced or edited.
 std::string version_of(const fs::path& path) {
   if (path.empty()) return "none";
