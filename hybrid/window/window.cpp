@@ -378,6 +378,7 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   glfwPollEvents();
   if (const std::string why = why_window_is_lost(); !why.empty()) throw std::runtime_error(why);
   s.play_events();
+  if (notes.kept_s.empty()) s.user.back_s = 0.0;  // there is no past to look at
   if (s.user.quit || glfwWindowShouldClose(handle) == GLFW_TRUE) return false;
   s.device_m = snapshot.device_m;
   s.measure_frame();
