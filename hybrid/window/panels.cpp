@@ -421,7 +421,7 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     chart.list = ImGui::GetWindowDrawList();
     if (open_section("Force")) {
       bool rest = frame.state.compares_with_rest;
-      if (has_soft(scene) && tick_box("compare with the force at rest", rest))
+      if (has_soft(scene) && controls::tick_box("compare with the force at rest", rest))
         result.actions.push_back({.verb = ViewVerb::rest, .numbers = {rest ? 1.0 : 0.0}});
       draw_force_chart(chart, take_place(kForceChart_em * pen.em), frame.history);
     }
