@@ -306,12 +306,12 @@ void go_back(LiveWindow& live, LiveSession& session, const PlayRequest& request,
 }
 
 // Keeps the session's state when it is time. The session stands still for at most one part in 20 of the time.
-void keep_state(LiveSession& session, const PlayRequest& request, const Player& player, double now_s,
+void keep_state(LiveSession& session, const PlayRequest& request, Player& player, double now_s,
                 std::chrono::steady_clock::time_point& next) {
   constexpr int rest = 19;
   const auto begin = std::chrono::steady_clock::now();
   if (begin < next || request.paused || !player.keeps_at(now_s)) return;
-  session.keep_state(request);
+  session.between_ticks(request, [&] { player.keep_state(); });
   const auto end = std::chrono::steady_clock::now();
   next = end + rest * (end - begin);
 }
@@ -344,9 +344,8 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
       request.asked = nullptr;
       watch = {};
     }
-    rest.follow(input.compares_with_rest, player, live.files, [&](const auto& change) {
-      if (session.hold(request)) change();
-    });
+    rest.follow(input.compares_with_rest, player, live.files,
+                [&](const auto& change) { session.between_ticks(request, change); });
     if (auto forces = live.comparison.poll()) live.effect->forces = forces;
     const auto back = PastView::shown(player, shown.t_s, input.back_s);
     if (back && input.go_on) {

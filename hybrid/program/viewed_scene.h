@@ -127,13 +127,16 @@ class SceneReload {
 // Begins and ends the comparison with the force at rest, as the window's user wishes.
 class RestWish {
  public:
-  // `between`: does its argument between two ticks. `says`: tells the user why the comparison cannot begin.
+  // `says` tells the user why the comparison cannot begin. `between` calls its argument between two ticks. If
+  // it does not, the next call tries again.
   template <class Says, class Between>
   void follow(bool wished, Player& player, Says& says, const Between& between) {
     if (wished == on_) return;
-    on_ = wished;
     std::string why_not;
-    between([&] { why_not = player.compare_with_rest(wished); });
+    between([&] {
+      why_not = player.compare_with_rest(wished);
+      on_ = wished;
+    });
     if (!why_not.empty()) says.say("Not compared with the force at rest: " + why_not + ".");
   }
 

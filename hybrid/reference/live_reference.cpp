@@ -9,9 +9,19 @@
 
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/feel/just_noticeable.h"
-#include "hybrid/tick/tick.h"
+#include "hybrid/reference/rest_watch.h"
 
 namespace hybrid {
+
+PassedTick passed_tick(std::uint64_t tick, double t_s, const World& world, const WorldState& state,
+                       const TickResult& felt) noexcept {
+  return {.tick = tick,
+          .t_s = t_s,
+          .device_m = felt.device_m,
+          .coupling_N = coupling_N_per_m(world, state) * (felt.proxy_m - felt.device_m),
+          .soft = std::any_of(state.reactions.begin(), state.reactions.end(),
+                              [](const voxel::Reaction& reaction) { return reaction.pressed > 0; })};
+}
 
 std::string why_no_live_reference(const World& world, const WorldState& state) {
   if (state.soft.empty()) return "nothing in the scene is soft";
@@ -44,13 +54,11 @@ std::optional<ForceAtRest> ReferenceSession::follow(std::span<const PassedTick> 
     (void)tick_at(last.device_m);
     return std::nullopt;
   }
-  std::array<glm::dvec3, kRestTicks> before_N{};
+  RestWatch rest(floor_N_);
   for (std::size_t n = 0; n < kMostTicksAtRest; ++n) {
     const glm::dvec3 now_N = tick_at(last.device_m);
-    glm::dvec3& earlier_N = before_N[n % kRestTicks];
-    if (n >= kRestTicks && jnd_of(earlier_N, now_N, floor_N_) < kAtRest_jnd)
-      return ForceAtRest{last.t_s, last.coupling_N, now_N, noticeable_N(now_N, floor_N_)};
-    earlier_N = now_N;
+    rest.see(now_N);
+    if (rest.at_rest()) return ForceAtRest{last.t_s, last.coupling_N, now_N, noticeable_N(now_N, floor_N_)};
   }
   return std::nullopt;
 }

@@ -5,7 +5,6 @@
 // session only adds each tick to a queue.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -18,6 +17,7 @@
 #include <vector>
 
 #include "hybrid/base/spsc_ring.h"
+#include "hybrid/tick/tick.h"
 #include "hybrid/world/edits.h"
 
 namespace hybrid {
@@ -29,6 +29,10 @@ struct PassedTick {
   glm::dvec3 device_m{0.0}, coupling_N{0.0};
   bool soft = false;
 };
+
+// The newest tick of a session, after which `state` is the session's state. `felt`: the tick's result.
+[[nodiscard]] PassedTick passed_tick(std::uint64_t tick, double t_s, const World& world,
+                                     const WorldState& state, const TickResult& felt) noexcept;
 
 // The forces between device and proxy of one tick: as felt, and once all tissue is at rest.
 // `noticeable_N`: the just noticeable difference (JND) of the force at rest.
@@ -63,9 +67,6 @@ class ReferenceSession {
   // Most ticks on the way of a call in contact, and ticks at its end. Of a longer way every second tick is
   // played, or every third, and so on.
   static constexpr std::size_t kMostTicksOnWay = 8, kMostTicksAtRest = 80;
-  // At rest: the force changes by less than kAtRest_jnd within kRestTicks ticks.
-  static constexpr std::size_t kRestTicks = 10;
-  static constexpr double kAtRest_jnd = 0.02;
 
   glm::dvec3 tick_at(const glm::dvec3& device_m) noexcept;
 

@@ -11,6 +11,7 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/feel/just_noticeable.h"
+#include "hybrid/reference/rest_watch.h"
 #include "hybrid/tick/tick.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
@@ -21,10 +22,6 @@ namespace {
 // the slow run tissue rests by then.
 constexpr double kBefore_s = 0.02, kUntilStill_s = 0.5;
 constexpr std::size_t kReportEvery = 64;  // ticks
-// The quick reference counts as at rest if its force changes by less than this within kRestTicks. A lag that
-// falls with the root of time is then below 0.4 JND after 0.1 s.
-constexpr double kAtRest_jnd = 0.02;
-constexpr std::size_t kRestTicks = 10;
 
 // Ticks since the device last moved; 0 while it moves.
 std::vector<std::size_t> ticks_still(const ForceCourse& course, double dt_s) {
@@ -60,36 +57,11 @@ double percentile(std::vector<double>& values, double share) {
   return values[std::min(i, values.size() - 1)];
 }
 
-// Decides when the reference is at rest under a device that stands still.
-class RestWatch {
- public:
-  // Bodies that move may move the tissue while the device is still, so nothing counts as at rest then.
-  RestWatch(const World& world, const SlowRunOptions& options)
-      : at_rest_jnd_(options.at_rest_jnd), floor_N_(options.floor_N) {
-    for (const RigidObject& object : world.rigid) {
-      if (object.motion.moves()) at_rest_jnd_ = 0.0;
-    }
-  }
-  [[nodiscard]] bool at_rest() const { return at_rest_; }
-  // Call it after each tick.
-  void see(bool still, const glm::dvec3& reference_N) {
-    if (!still || at_rest_jnd_ <= 0.0) {
-      at_rest_ = false;
-      seen_ = 0;
-      return;
-    }
-    glm::dvec3& before_N = last_N_[seen_ % kRestTicks];
-    if (seen_ >= kRestTicks && jnd_of(before_N, reference_N, floor_N_) < at_rest_jnd_) at_rest_ = true;
-    before_N = reference_N;
-    ++seen_;
-  }
-
- private:
-  double at_rest_jnd_, floor_N_;
-  bool at_rest_ = false;
-  std::size_t seen_ = 0;
-  std::array<glm::dvec3, kRestTicks> last_N_{};
-};
+// Bodies that move may move the tissue while the device is still, so nothing counts as at rest then.
+bool may_rest(const World& world) {
+  return std::none_of(world.rigid.begin(), world.rigid.end(),
+                      [](const RigidObject& object) { return object.motion.moves(); });
+}
 
 // Collects the errors of compared ticks.
 class Errors {
@@ -151,7 +123,7 @@ SlowRunOptions slow_run_options(Reference reference) {
   options.slower = kQuickSlower;
   options.slower_still = kSlower;
   options.wide_patches = false;
-  options.at_rest_jnd = kAtRest_jnd;
+  options.stops_at_rest = true;
   return options;
 }
 
@@ -168,7 +140,8 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
   const std::vector<std::size_t> still = ticks_still(course, options.dt_s);
   const std::vector<bool> slow = slow_ticks(course, still, options.dt_s);
   Errors errors;
-  RestWatch rest(world, options);
+  RestWatch rest(options.floor_N);
+  const bool stops_at_rest = options.stops_at_rest && may_rest(world);
   std::size_t seen = 0;
   glm::dvec3 from = state.device_m;
   for (std::size_t t = 0; t < course.size() && seen < contact; ++t) {
@@ -181,7 +154,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
                                    options.slower,
                                    100.0 * static_cast<double>(t) / static_cast<double>(course.size())));
     const CourseTick& tick = course[t];
-    if (still[t] == 0) rest.see(false, {});
+    if (still[t] == 0) rest.begin_anew();
     const int factor = still[t] > 0 && options.slower_still > 0 ? options.slower_still : options.slower;
     const int parts = slow[t] && !rest.at_rest() ? factor : 1;
     TickResult felt;
@@ -194,7 +167,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
     if (options.wide_patches) widen(state, wide);
     from = tick.device_m;
     const glm::dvec3 reference = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
-    rest.see(still[t] > 0, reference);
+    if (stops_at_rest && still[t] > 0) rest.see(reference);
     if (!tick.soft) continue;
     ++seen;
     errors.add(glm::distance(tick.force_N, reference), jnd_of(tick.force_N, reference, options.floor_N),

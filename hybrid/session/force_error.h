@@ -66,10 +66,9 @@ struct SlowRunOptions {
   int slower_still = 0;                              // the same while the device is still; 0: `slower`
   // Nested patches are twice as wide, so that the error at their ends is a part of the result.
   bool wide_patches = true;
-  // While the device is still, the reference counts as at rest once its force has changed by less than this
-  // (JND) within kRestTicks. From there on it is played as fast as the session. 0: it never counts as at
-  // rest.
-  double at_rest_jnd = 0.0;
+  // The reference is played as fast as the session while the device is still and the force is at rest
+  // (rest_watch.h).
+  bool stops_at_rest = false;
 };
 
 // The options of a reference.

@@ -75,10 +75,12 @@ class LiveSession {
     for (int n = 0; n < kMostWaits && !ended_ && snapshots_.take().scene != player_.scene_number(); ++n)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  // Keeps the present state (Player::keep_state()). The session stands still meanwhile.
-  void keep_state(const PlayRequest& request) {
+  // Calls `act` between two ticks; the session stands still meanwhile. For what leaves the state as it is:
+  // Player::keep_state(), compare_with_rest(). Does nothing if the session does not answer.
+  template <class Act>
+  void between_ticks(const PlayRequest& request, const Act& act) {
     if (!hold(request)) return;
-    player_.keep_state();
+    act();
     ask(request);
   }
   [[nodiscard]] bool ended() const { return ended_; }

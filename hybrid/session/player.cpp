@@ -227,18 +227,6 @@ std::string Player::compare_with_rest(bool on) {
   return why_no_live_reference(*built_->world, *built_->state);
 }
 
-void Player::add_to_reference() noexcept {
-  const WorldState& state = *built_->state;
-  const bool soft = std::any_of(state.reactions.begin(), state.reactions.end(),
-                                [](const voxel::Reaction& reaction) { return reaction.pressed > 0; });
-  reference_->passed(
-      {.tick = ticks_,
-       .t_s = t_s(),
-       .device_m = felt_.device_m,
-       .coupling_N = coupling_N_per_m(*built_->world, state) * (felt_.proxy_m - felt_.device_m),
-       .soft = soft});
-}
-
 void Player::snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked) const {
   fill_figures(out, *kept.state, kept.felt, kept.ticks);
   fill_moved(*built_->world, *kept.state, out);
@@ -304,7 +292,7 @@ bool Player::advance(const PlayRequest& request, const device::ServoInput& input
   if (!request.dragging) goal_m_ = felt_.device_m;
   keep(input.device.fault);
   samples_.push(sample_of(felt_, t_s(), input.late_s, dt_s_));
-  if (reference_) add_to_reference();
+  if (reference_) reference_->passed(passed_tick(ticks_, t_s(), *built_->world, *built_->state, felt_));
   ++ticks_;
   return true;
 }

@@ -183,7 +183,6 @@ class Player {
  private:
   void take_edits() noexcept;
   void begin_reference();
-  void add_to_reference() noexcept;
   [[nodiscard]] bool tick_is_due(const PlayRequest& request) noexcept;
   void steer(const PlayRequest& request) noexcept;
   void keep(device::DeviceFault fault) noexcept;

@@ -12,6 +12,7 @@
 #include "device/loop/stop_signal.h"
 #include "device/simulated/simulated.h"
 #include "hybrid/base/flush_to_zero.h"
+#include "hybrid/reference/live_reference.h"
 #include "hybrid/session/equilibrium.h"
 #include "hybrid/session/pair_presses.h"
 #include "hybrid/session/relaxation_thread.h"
@@ -250,10 +251,8 @@ class Run {
   }
 
   void keep_in_course(const TickResult& felt) {
-    const bool soft = std::any_of(state_.reactions.begin(), state_.reactions.end(),
-                                  [](const voxel::Reaction& r) { return r.pressed > 0; });
-    course_->push_back(
-        {felt.device_m, coupling_N_per_m(world_, state_) * (felt.proxy_m - felt.device_m), soft});
+    const PassedTick passed = passed_tick(0, 0.0, world_, state_, felt);
+    course_->push_back({passed.device_m, passed.coupling_N, passed.soft});
   }
 
   void measure_clearance(std::uint64_t tick) {

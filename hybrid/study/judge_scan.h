@@ -18,7 +18,7 @@ namespace hybrid {
 struct StudyOptions {
   std::vector<ScanPair> scans{};
   std::filesystem::path out{};  // a folder for each scan, by its name
-  // What is common to all scans: names, rigid, soft, range, spacing_m. The rest is not used.
+  // All scans are composed with its names, rigid, soft, range and spacing_m. Its other members are not used.
   ComposeOptions compose{};
   double error_jnd = 1.0;
   std::optional<double> budget_us{};  // limit for the p99.9 of the tick; default: kBudgetShare of the period
@@ -62,10 +62,10 @@ struct JudgedScan {
   [[nodiscard]] bool good() const { return failed.empty() && faults.empty() && in_time() && accurate(); }
 };
 
-// Composes, plays and judges. In the scan's folder are: scene/ (the scene), compose.json (what it was
-// composed from) and cache/ (finished parts). A scene is composed again only if its files or options changed,
-// and played again only if it or the program changed. A scene that was edited since is judged as it is. Any
-// error but a signal is a result with `failed`.
+// Composes a scene from the scan, plays it, and judges it. The scan's folder has the scene (scene/), the
+// record of its composition (compose.json) and finished parts (cache/). A scene is composed again only if its
+// files or options changed, and played again only if it or the program changed. A scene that was edited since
+// is judged as it is. Any error but a signal is a result with `failed`.
 JudgedScan judge_scan(const ScanPair& pair, const StudyOptions& options);
 
 }  // namespace hybrid

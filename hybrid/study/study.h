@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `hybrid study`: a scene for each of many scans, what it costs, and what it gets wrong. The scans that are
-// unlike the others come first.
+// `hybrid study`: composes a scene from each of many scans, and finds the cost and the error of each scene.
+// The scans that are unlike the others come first.
 #pragma once
 
 #include <functional>
@@ -29,7 +29,7 @@ struct Study {
 };
 
 // Judges all scans in turn. Calls `on_scan` with each of them, and its number from 1 on. Throws
-// device::StopAsked after a signal; what is done stays in the folders of the scans.
+// device::StopAsked after a signal. The folders of the scans keep the finished parts.
 void study(const StudyOptions& options, const std::function<void(const JudgedScan&, std::size_t)>& on_scan);
 
 // Sorts the scans, and finds outliers.

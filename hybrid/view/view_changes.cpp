@@ -13,8 +13,8 @@
 namespace hybrid {
 namespace {
 
-// A part of a mesh is left as it was drawn while it has moved less than this share of what moves fastest in
-// the frame, and less than a pixel. A tenth of a pixel is never seen.
+// A part of a mesh is not drawn again while its motion is less than kShareOfFastest of the fastest motion in
+// the frame, and less than kMostUndrawn_px. A motion below kLeastSeen_px is never seen.
 constexpr float kShareOfFastest = 0.25F;
 constexpr float kMostUndrawn_px = 1.0F, kLeastSeen_px = 0.1F;
 // The same for values that give a colour: share of the scale.
