@@ -145,7 +145,7 @@ class CostErrorPlot {
     const std::string words = shortened(m.words, kMostOfName);
     const double width = kLetterWidth * static_cast<double>(letters(words));
     const double aside = radius_of(m) + (m.ringed ? kRing : 0.0) + 5.0;
-    // Beside the mark, then above and below its middle.
+    // The name is tried at the height of the mark, then above it, then below it; each time on both sides.
     for (const double lower : {-3.0, -16.0, 14.0}) {
       for (const bool left : {false, true}) {
         const double x = left ? x_of(m) - aside : x_of(m) + aside, from = left ? x - width : x;

@@ -33,7 +33,8 @@ FrameLayout frame_layout(int width, int height, bool help, bool panel = false, b
 // The nearer view of the contact is drawn only if it is at least this many times nearer.
 inline constexpr double kLeastNearer = 1.5;
 
-// Scale of `near` in the inset over that of `whole` in the scene's rectangle, both at their targets.
+// Ratio of two scales, each at its camera's target: of `near` in the inset, and of `whole` in the scene's
+// rectangle.
 double times_nearer(const Camera& near, const PixelRect& inset, const Camera& whole, const PixelRect& scene);
 
 }  // namespace hybrid

@@ -90,7 +90,8 @@ bool meet_face(const Way& way, const Corners& corner, const glm::dvec3& normal, 
   return true;
 }
 
-// A ball against a side (a cylinder round it) and its first corner (a ball round it).
+// The first hit of a moving ball on the side ab and on its corner a. The ball's centre then lies on a cylinder
+// round the side, or on a sphere round the corner.
 void meet_rim(const Way& way, const glm::dvec3& a, const glm::dvec3& b, SweptHit& best) {
   const glm::dvec3 side = b - a, at = way.from - a;
   const double ss = glm::dot(side, side), sw = glm::dot(side, way.along), sa = glm::dot(side, at);

@@ -8,9 +8,10 @@
 //
 // A contact stores at least a third of force times depth. (It stores a third if active chain limits give the
 // dent the shape of a cone, where E ~ depth³, and half without active limits.) If the contact was given less,
-// the force on the way out is scaled by share(), which is at least 0.8. The lower bound is needed because
-// work is counted wrongly where tissue is stiffer than the tool's coupling. The share changes gradually, and
-// returns to 1 while the tool rests.
+// the force is scaled by share(), the ratio of the two energies, which is at least 0.8. The lower bound is
+// needed because work is counted wrongly where tissue is stiffer than the tool's coupling. The share does not
+// depend on the direction of the motion. Otherwise the tool would move to and fro as the share changes. It
+// returns to 1 while the tool presses on or rests, and a new contact begins with 1.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -31,7 +32,7 @@ class ContactEnergy {
  private:
   bool begun_ = false;
   double given_J_ = 0.0, share_ = 1.0;
-  glm::dvec3 felt_N_{0.0};
+  glm::dvec3 last_N_{0.0};
 };
 
 }  // namespace voxel

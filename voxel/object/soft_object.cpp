@@ -86,6 +86,7 @@ std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
     result->near_on_grid_.assign(near_on_grid_.begin(), near_on_grid_.end());
     result->on_grid_ = on_grid_;
     result->centre_ = centre_;
+    result->dent_m_ = dent_m_;
     result->grid_force_N_ = grid_force_N_;
     result->grid_tool_m_ = grid_tool_m_;
     result->contact_energy_ = contact_energy_;

@@ -367,8 +367,7 @@ class SoftObject {
   void put_aside(const ToolInBody& tool) noexcept;
   void press_on_grid(const ToolInBody& tool) noexcept;
   void settle_on_grid(const ToolInBody& tool) noexcept;
-  [[nodiscard]] std::array<bool, 3> axes_due() noexcept;
-  [[nodiscard]] double depth_on_grid() const noexcept;
+  [[nodiscard]] std::array<bool, 3> axes_due(const glm::dvec3& way_m) noexcept;
   [[nodiscard]] Reaction reaction_on_grid(const ToolInBody& tool) const noexcept;
   [[nodiscard]] bool at_anchors_end(VoxelId v, const glm::dvec3& direction) const noexcept;
   // Bound of a pressed voxel on one axis: the axis, the direction out of the tool, and the displacement at
@@ -445,6 +444,7 @@ class SoftObject {
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // force and tool position of the last cycle
   ContactEnergy contact_energy_;
   double nearest_m_ = 0.0;  // smallest gap between a voxel and the tool
+  glm::dvec3 dent_m_{0.0};  // mean displacement of the voxels pressed last
 };
 
 }  // namespace voxel

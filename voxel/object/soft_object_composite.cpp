@@ -19,7 +19,8 @@ namespace {
 // Voxels of the finest patch beyond the contact. A wide tool has fewer, at least kLeastMargin, because more
 // would exceed the work of a tick.
 constexpr int kMargin = 6, kLeastMargin = 4;
-constexpr double kFelt = 0.3;  // fraction of the force; an axis with less is relaxed in every second tick
+// Fraction of the force, and of the tool's motion. An axis with less of both is relaxed in every second tick.
+constexpr double kFelt = 0.3;
 constexpr std::uint32_t kAllAxes = 4;  // number of cycles at the start of a contact that relax all axes
 // In spacings. A voxel no further than kPressed from the tool is pressed. Tissue on its way back is still
 // felt up to a distance of kOnItsWay.
@@ -34,14 +35,13 @@ constexpr double kAtRest_N = 1e-5;    // force on the tool below which a contact
 constexpr double kMoves = 0.03;       // spacings: a tool that moved further gets a second cycle in the tick
 constexpr double kFlat = 1.5;  // greatest ratio of spacings for which the width of a ball's contact is known
 
-// Call it before a cycle. It extrapolates the displacements to a tool that moved by `way_m`. Far tissue is
-// scaled; near tissue moves with the tool. If near tissue were scaled too, it would leave the tool and be
-// pressed in again.
-void go_along(CompositeGrid& grid, const std::array<int, 3>& centre, const glm::dvec3& force_N,
+// Call it before a cycle. It extrapolates the displacements to a tool that moved by `way_m` and has displaced
+// the pressed voxels by `dent_m` on average. Far tissue is scaled; near tissue moves with the tool. If near
+// tissue were scaled too, it would leave the tool and be pressed in again.
+void go_along(CompositeGrid& grid, const glm::dvec3& dent_m, const glm::dvec3& force_N,
               const glm::dvec3& way_m, double spacing_m) noexcept {
-  if (!grid.in_fine_patch(centre)) return;
   const int axis = CompositeGrid::largest_axis(force_N);
-  const double inwards = force_N[axis] > 0.0 ? -1.0 : 1.0, depth_m = inwards * grid.fine_at(centre)[axis];
+  const double inwards = force_N[axis] > 0.0 ? -1.0 : 1.0, depth_m = inwards * dent_m[axis];
   if (depth_m < kLeastToScale * spacing_m) return;
   const double part = std::clamp(inwards * way_m[axis] / depth_m, -kMostScaled, kMostScaled);
   grid.extrapolate(static_cast<std::size_t>(axis), std::pow(1.0 + part, kWithDepth) - 1.0,
@@ -182,6 +182,7 @@ bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
   if (any && !on_grid_) {
     grid_->begin(centre);
     centre_ = centre;
+    dent_m_ = glm::dvec3(0.0);
     on_grid_ = moved_ever_ = true;
     list_near_on_grid();
     grid_cycles_ = grid_ticks_ = 0;
@@ -258,7 +259,7 @@ void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
 
 // Call it after a cycle. It moves all voxels out of the tool, except those that anchors keep in it.
 void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
-  glm::dvec3 sum(0.0);
+  glm::dvec3 sum(0.0), moved(0.0);
   int pressed = 0;
   nearest_m_ = std::numeric_limits<double>::max();
   double least = std::numeric_limits<double>::max();
@@ -284,6 +285,7 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
     }
     t.pressed = true;
     t.normal = g.normal;
+    moved += u;
     sum += glm::dvec3(c[0], c[1], c[2]);
     ++pressed;
   }
@@ -294,23 +296,25 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
     return;
   }
   sum /= static_cast<double>(pressed);
+  dent_m_ = moved / static_cast<double>(pressed);
   for (int d = 0; d < 3; ++d) centre_[static_cast<std::size_t>(d)] = static_cast<int>(std::lround(sum[d]));
 }
 
-// Axes to relax in the next cycle. An axis that carries little force changes little, so it is relaxed in
-// every second tick.
-std::array<bool, 3> SoftObject::axes_due() noexcept {
+// Axes to relax in the next cycle, before which the tool moves by `way_m`. An axis that carries little force
+// and along which the tool hardly moves changes little, so it is relaxed in every second tick.
+std::array<bool, 3> SoftObject::axes_due(const glm::dvec3& way_m) noexcept {
   const bool first_of_tick = contact_work_ == 0;
   if (first_of_tick) ++grid_ticks_;
   if (grid_cycles_++ < kAllAxes) return {true, true, true};
   std::array<bool, 3> due{};
-  const double felt = kFelt * glm::length(grid_force_N_);
+  const double felt_N = kFelt * glm::length(grid_force_N_), least_m = kFelt * glm::length(way_m);
   int others = 0;
   for (int d = 0; d < 3; ++d) {
-    const bool carries = std::abs(grid_force_N_[d]) > felt;
+    const bool carries = std::abs(grid_force_N_[d]) > felt_N;
+    const bool changes = carries || (first_of_tick && std::abs(way_m[d]) > least_m);
     const bool turn = first_of_tick && static_cast<std::uint32_t>(others) == grid_ticks_ % 2;
-    due[static_cast<std::size_t>(d)] = carries || turn;
-    if (!carries) ++others;
+    due[static_cast<std::size_t>(d)] = changes || turn;
+    if (!changes) ++others;
   }
   return due;
 }
@@ -325,23 +329,16 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   }
   if (contact_work_ == 0 && grid_->centre_on(centre_)) list_near_on_grid();
   const double h = lattice_->min_spacing_m();
-  if (nearest_m_ <= kPressed * h) go_along(*grid_, centre_, grid_force_N_, tool.centre - grid_tool_m_, h);
+  if (nearest_m_ <= kPressed * h) go_along(*grid_, dent_m_, grid_force_N_, tool.centre - grid_tool_m_, h);
   press_on_grid(tool);
-  grid_->cycle(axes_due());
+  grid_->cycle(axes_due(tool.centre - grid_tool_m_));
   contact_work_ += grid_->work_of_cycle();
   settle_on_grid(tool);
   grid_force_N_ = grid_->force_on_tool_N();
-  contact_energy_.account(tool.centre - grid_tool_m_, grid_force_N_, depth_on_grid());
+  contact_energy_.account(tool.centre - grid_tool_m_, grid_force_N_, depth_of(dent_m_, grid_force_N_));
   grid_tool_m_ = tool.centre;
   const bool away = nearest_m_ > kOnItsWay * lattice_->min_spacing_m();
   if (away && glm::length(grid_force_N_) < kAtRest_N) on_grid_ = false;
-}
-
-// Displacement of the contact's centre in the direction opposite to the force (unit: meter).
-double SoftObject::depth_on_grid() const noexcept {
-  const double size = glm::length(grid_force_N_);
-  if (size == 0.0 || !grid_->in_fine_patch(centre_)) return 0.0;
-  return -glm::dot(grid_->fine_at(centre_), grid_force_N_) / size;
 }
 
 Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
@@ -350,15 +347,18 @@ Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {
   const double size = glm::length(grid_force_N_);
   const glm::dvec3 n = size > 0.0 ? grid_force_N_ / size : glm::dvec3(0.0);
   for (const Touch& t : touches_) result.pressed += t.pressed ? 1U : 0U;
-  const double depth = std::max(kLeastDepth * lattice_->min_spacing_m(), depth_on_grid());
+  const double depth = std::max(kLeastDepth * lattice_->min_spacing_m(), depth_of(dent_m_, grid_force_N_));
   if (result.pressed == 0 && (size == 0.0 || nearest_m_ > kOnItsWay * lattice_->min_spacing_m()))
     return result;
   result.pressed = std::max(result.pressed, 1U);
   if (size == 0.0) {
     // no force has reached the anchors yet
-    if (!grid_->in_fine_patch(centre_)) return result;
-    const glm::dvec3 springs = static_cast<double>(result.pressed) / grid_->compliance(centre_);
-    for (int d = 0; d < 3; ++d) result.stiffness_N_per_m[d][d] = springs[d];
+    for (const Touch& t : touches_) {
+      const std::array<int, 3> c = lattice_->coordinates(t.v);
+      if (!t.pressed || !grid_->in_fine_patch(c)) continue;
+      const glm::dvec3 springs = 1.0 / grid_->compliance(c);
+      for (int d = 0; d < 3; ++d) result.stiffness_N_per_m[d][d] += springs[d];
+    }
   } else {
     // The secant stiffness, along the force. Across it the tool slides without friction. Where steps by this
     // model go too far, the tick learns a larger stiffness (settle_contact.cpp).
