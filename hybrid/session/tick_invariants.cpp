@@ -55,8 +55,7 @@ bool finite(const WorldState& state) {
     if (!good) return false;
   }
   return std::isfinite(state.clock.now_s()) && std::isfinite(state.limit.elapsed_s) &&
-         polygon::is_finite(state.limit.last_N) &&
-         polygon::is_finite(state.learnt_stiffness_N_per_m * glm::dvec3(1.0)) &&
+         polygon::is_finite(state.limit.last_N) && std::isfinite(state.learnt_stiffness_N_per_m) &&
          std::isfinite(state.damping.balance_J);
 }
 

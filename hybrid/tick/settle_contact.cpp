@@ -43,10 +43,9 @@ glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm:
 // The tissue's model is the stiffness of the voxels that are pressed now. The true stiffness is larger when a
 // chain tightens as the proxy moves, or when the tool meets further voxels. Steps by the model alone could
 // then alternate between two places without end. If a step overshoots (the pull changes sign), the secant
-// stiffness is learnt along the step: with it the step would have ended at zero pull. Across the step the
-// model stands, because a stiffness there would only delay the tool. Learnt stiffness decays over the next
-// passes. Nothing is learnt from other steps: over a short step, tissue that relaxes meanwhile looks
-// arbitrarily stiff.
+// stiffness is learnt: with it the step would have ended at zero pull. It decays over the next passes.
+// Nothing is learnt from other steps: over a short step, tissue that relaxes meanwhile looks arbitrarily
+// stiff.
 void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
                      const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
   state.learnt_stiffness_N_per_m *= kSettings.kept;
@@ -56,12 +55,10 @@ void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& de
   const double overshoot = std::min(-glm::dot(after, delta) / wanted, kSettings.most_overshoot);
   if (overshoot < kSettings.least_overshoot) return;
   const double along_model = glm::dot(delta, model * delta) / square,
-               along_used = glm::dot(delta, used * delta) / square,
-               along_learnt = glm::dot(delta, state.learnt_stiffness_N_per_m * delta) / square;
+               along_used = glm::dot(delta, used * delta) / square;
   const double learnt =
       std::min(along_used * (1.0 + overshoot) - along_model, kSettings.most_learnt * along_model);
-  if (learnt > along_learnt)
-    state.learnt_stiffness_N_per_m += (learnt - along_learnt) / square * glm::outerProduct(delta, delta);
+  state.learnt_stiffness_N_per_m = std::max(state.learnt_stiffness_N_per_m, learnt);
 }
 
 struct OutsideRigid {
@@ -134,7 +131,7 @@ double move_proxy(const World& world, WorldState& state, const glm::dvec3& devic
   for (const voxel::Reaction& reaction : state.reactions) model += reaction.stiffness_N_per_m;
   // The learnt stiffness applies only in contact. A free proxy goes to the device at once.
   const bool pressed = model != glm::dmat3(k);
-  const glm::dmat3 metric = pressed ? model + state.learnt_stiffness_N_per_m : model;
+  const glm::dmat3 metric = pressed ? model + glm::dmat3(state.learnt_stiffness_N_per_m) : model;
   const glm::dvec3 pull = pull_on_proxy(world, state, device);
   // Without tissue the target is the device, to the last bit.
   const glm::dvec3 target =
@@ -187,7 +184,7 @@ Sweep settle_contact(const World& world, WorldState& state, const glm::dvec3& de
   std::fill(state.rigid_force_N.begin(), state.rigid_force_N.end(), glm::dvec3(0.0));
   if (!around.near_soft) {
     std::fill(state.reactions.begin(), state.reactions.end(), voxel::Reaction{});
-    state.learnt_stiffness_N_per_m = glm::dmat3(0.0);
+    state.learnt_stiffness_N_per_m = 0.0;
     state.jammed.clear();
   } else if (!reaction_is_current(state)) {
     press_tissue(world, state, state.proxy_m, glm::dvec3(0.0), 0);

@@ -108,7 +108,7 @@ struct CarriedState {
   std::uint64_t truncated_ticks = 0;  // ticks in which a bound on steps or work stopped the proxy early
 
   // ---- of the proxy ----
-  glm::dmat3 learnt_stiffness_N_per_m{0.0};  // tissue stiffness in excess of the pressed voxels' model
+  double learnt_stiffness_N_per_m = 0.0;  // tissue stiffness in excess of the pressed voxels' model
   // Half-spaces of voxels that could not leave the tool's way when last pressed (scene frame).
   std::vector<polygon::ContactPlane> jammed;
   std::vector<RigidState> rigid;          // [rigid]

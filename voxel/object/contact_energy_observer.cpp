@@ -25,8 +25,11 @@ void ContactEnergy::account(const glm::dvec3& way_m, const glm::dvec3& force_N, 
   } else {
     const double pressed_J = -0.5 * glm::dot(last_N_ + force_N, way_m);
     given_J_ += pressed_J > 0.0 ? pressed_J : share_ * pressed_J;
-    if (std::abs(pressed_J) < kStands * held_J)
+    if (std::abs(pressed_J) < kStands * held_J) {
+      // Tissue that relaxes under a tool at rest takes no energy from the tool.
+      given_J_ = std::max(given_J_, share_ * kLetGo * held_J);
       given_J_ += kComesBack * std::max(kLetGo * held_J - given_J_, 0.0);
+    }
     given_J_ = std::max(given_J_, kLeast * kLetGo * held_J);
   }
   share_ = held_J > 0.0 ? std::min(given_J_ / (kLetGo * held_J), 1.0) : 1.0;

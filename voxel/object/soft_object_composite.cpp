@@ -48,6 +48,12 @@ void go_along(CompositeGrid& grid, const glm::dvec3& dent_m, const glm::dvec3& f
                    std::abs(part) * depth_m);
 }
 
+// Mean displacement of the pressed voxels in the direction opposite to the force (unit: meter).
+double depth_of(const glm::dvec3& dent_m, const glm::dvec3& force_N) noexcept {
+  const double size = glm::length(force_N);
+  return size == 0.0 ? 0.0 : -glm::dot(dent_m, force_N) / size;
+}
+
 }  // namespace
 
 std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
