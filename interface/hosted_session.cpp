@@ -11,7 +11,7 @@
 #include "hybrid/base/flush_to_zero.h"
 #include "hybrid/build/choose_model.h"
 #include "hybrid/scene/read_scene_text.h"
-#include "hybrid/session/equilibrium.h"
+#include "hybrid/tick/copy_state.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
 namespace c_interface {

@@ -10,8 +10,8 @@
 
 #include "hybrid/compare/compare.h"
 #include "hybrid/feel/just_noticeable.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/report.h"
+#include "hybrid/tick/copy_state.h"
 
 namespace hybrid {
 namespace {

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "device/loop/stop_signal.h"
@@ -20,6 +21,7 @@
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/scene/table_reader.h"
+#include "hybrid/session/real_device.h"
 
 namespace {
 
@@ -35,7 +37,8 @@ constexpr const char* kAbout =
 
 void add_device(CLI::App& sub, std::string& device) {
   sub.add_option("--device", device, "use this one in place of the scene's")
-      ->check(CLI::IsMember({"phantom", "premium-1.5", "touch", "ideal"}));
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(hybrid::kDeviceNames), std::end(hybrid::kDeviceNames))));
 }
 
 void add_run(CLI::App& app, int& status) {

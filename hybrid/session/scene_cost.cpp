@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-#include "hybrid/session/equilibrium.h"
+#include "hybrid/tick/copy_state.h"
 #include "hybrid/tick/tissue/press_tissue.h"
 
 namespace hybrid {

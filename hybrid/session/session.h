@@ -136,8 +136,8 @@ void begin_session(const Scene& scene, const World& world, WorldState& state, co
 BlackBoxRow black_box_row(const device::ServoInput& input, const TickResult& felt, std::uint64_t tick,
                           const WorldState& state) noexcept;
 
-// Hashes. The running hash covers the forces. The final hash also covers every displacement, the pose and
-// motion of every rigid body, and the state of the force limits.
+// Hashes. The running hash covers proxy, force and contacts. The final hash also covers every displacement,
+// the pose and motion of every rigid body, and the state of the force limits.
 inline constexpr std::uint64_t kHashBegin = 0xCBF29CE484222325ULL;
 std::uint64_t hash_tick(std::uint64_t before, const TickResult& tick) noexcept;
 std::uint64_t hash_state(std::uint64_t before, const WorldState& state) noexcept;

@@ -8,8 +8,8 @@
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/flush_to_zero.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/session.h"
+#include "hybrid/tick/copy_state.h"
 #include "hybrid/tick/proxy/proxy_sweep.h"
 
 namespace hybrid {

@@ -23,8 +23,7 @@ namespace hybrid {
 [[nodiscard]] bool take_over(const World& before_world, const WorldState& before, const World& world,
                              std::unique_ptr<WorldState>& state);
 
-// The force at the device's present place when all tissue is at rest. Rigid objects must not move. Quicker
-// than equilibrium_force(), which is for references.
+// The force at the device's present place when all tissue is at rest. Rigid objects must not move.
 struct RestForce {
   glm::dvec3 force_N{0.0};
   bool steady = false;  // false: it still changed by more than 0.2 % in a tenth of a second

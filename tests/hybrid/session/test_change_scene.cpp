@@ -12,9 +12,9 @@
 
 #include "hybrid/build/choose_model.h"
 #include "hybrid/scene/read_scene_text.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/player.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
+#include "tests/hybrid/fixtures/equilibrium.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 
 namespace {
@@ -69,7 +69,7 @@ class ChangedScene : public tests::SceneFile {
     const auto whole = build(text);
     hybrid::Player player(whole->scene, whole->built, whole->drawn, nullptr);
     for (int n = 0; n < ticks; ++n) player.step({});
-    const auto force = hybrid::equilibrium_force(*whole->built.world, *whole->built.state);
+    const auto force = tests::equilibrium_force(*whole->built.world, *whole->built.state);
     return force ? glm::length(*force) : -1.0;
   }
   void expect_replays() {

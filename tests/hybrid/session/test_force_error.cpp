@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 
 #include "hybrid/feel/just_noticeable.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/force_error.h"
+#include "tests/hybrid/fixtures/equilibrium.h"
 #include "tests/hybrid/fixtures/touch.h"
 
 namespace {
@@ -130,7 +130,7 @@ TEST_F(ForceErrorOfRun, DoesNotRestTooEarly) {
   constexpr std::size_t kFrom = 130, kTo = 490;  // ticks
   hybrid::BuiltScene held = hybrid::build_scene(scene);
   (void)hybrid::run_session(scene, held, options(false, kInHold_s));
-  const auto at_rest = hybrid::equilibrium_force(*held.world, *held.state);
+  const auto at_rest = tests::equilibrium_force(*held.world, *held.state);
   ASSERT_TRUE(at_rest);
   hybrid::BuiltScene whole = hybrid::build_scene(scene);
   const hybrid::SessionResult session = hybrid::run_session(scene, whole, options(false));

@@ -10,12 +10,12 @@
 #include <iostream>
 
 #include "hybrid/feel/just_noticeable.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/forces_between.h"
 #include "hybrid/snapshot/fill_snapshot.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
 #include "hybrid/snapshot/merge_live_surface.h"
 #include "hybrid/tick/tissue/obstacles.h"
+#include "tests/hybrid/fixtures/equilibrium.h"
 #include "tests/hybrid/fixtures/touch.h"
 
 namespace {
@@ -131,7 +131,7 @@ TEST_F(GridSession, ATightChainIsFeltAsAtRest) {
     tests::Touch touch(load(text), {0.0, 0.0, top + 0.003}, true);
     ASSERT_TRUE(touch.state().soft[0]->uses_patches());
     const double felt_N = touch.go({0.0, 0.0, top - depth}, 2e-5, 100).force_N.z;
-    const auto equilibrium = hybrid::equilibrium_force(touch.world(), touch.state());
+    const auto equilibrium = tests::equilibrium_force(touch.world(), touch.state());
     ASSERT_TRUE(equilibrium) << edge;
     std::printf("%d voxels an edge, %.2f mm deep: %.4f N, at rest in wide boxes %.4f N\n", edge, 1e3 * depth,
                 felt_N, equilibrium->z);
@@ -175,7 +175,7 @@ TEST_F(GridSession, LayersWithATightChainAreFeltAsAtRest) {
       for (const double step : {1e-4, 2e-5}) {
         touch.go({0.0, 0.0, top - depth}, step, 0);
         const double moving_N = touch.at({0.0, 0.0, top - depth}).force_N.z;
-        const auto at_rest = hybrid::equilibrium_force(touch.world(), touch.state());
+        const auto at_rest = tests::equilibrium_force(touch.world(), touch.state());
         ASSERT_TRUE(at_rest) << depth;
         std::printf("%.1f mm deep: %.4f N, at rest in wide boxes %.4f N\n", 1e3 * depth, moving_N,
                     at_rest->z);
@@ -199,7 +199,7 @@ TEST_F(GridSession, AWideToolIsFeltAsAtRest) {
   tests::Touch touch(load(text), {0.0, 0.0, top + 0.002}, true);
   ASSERT_TRUE(touch.state().soft[0]->uses_patches());
   const double felt_N = touch.go({0.0, 0.0, top - 5e-3}, 1e-4, 0).force_N.z;
-  const auto at_rest = hybrid::equilibrium_force(touch.world(), touch.state());
+  const auto at_rest = tests::equilibrium_force(touch.world(), touch.state());
   ASSERT_TRUE(at_rest);
   EXPECT_NEAR(felt_N, at_rest->z, 0.35 * 0.04);  // 0.35 of the least just noticeable difference
 }

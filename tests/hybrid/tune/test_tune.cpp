@@ -15,13 +15,13 @@
 #include "hybrid/compare/compare.h"
 #include "hybrid/compare/compare_scenes.h"
 #include "hybrid/feel/just_noticeable.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/session/session.h"
 #include "hybrid/tick/tick.h"
 #include "hybrid/tune/edit_scene.h"
 #include "hybrid/tune/tune_page.h"
 #include "hybrid/tune/tune_plot.h"
 #include "hybrid/tune/tune_report.h"
+#include "tests/hybrid/fixtures/equilibrium.h"
 #include "tests/hybrid/fixtures/scene_file_fixture.h"
 
 namespace {
@@ -81,7 +81,7 @@ TEST_F(Tune, ATruthIsAtRestInItsPoses) {
     const device::DeviceState at{.position_m = truth.course[t].device_m};
     (void)hybrid::haptic_tick(*built.world, *built.state, at, 1e-3);
     if (!poses.held[t] || !truth.course[t].soft) continue;
-    const auto rest_N = hybrid::equilibrium_force(*built.world, *built.state);
+    const auto rest_N = tests::equilibrium_force(*built.world, *built.state);
     ASSERT_TRUE(rest_N);
     EXPECT_LT(hybrid::jnd_of(truth.course[t].force_N, *rest_N, 0.04), 0.2) << t;
     ++held;

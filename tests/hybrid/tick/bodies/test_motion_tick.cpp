@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "hybrid/session/equilibrium.h"
+#include "tests/hybrid/fixtures/equilibrium.h"
 #include "tests/hybrid/fixtures/feel_scene.h"
 
 namespace {
@@ -222,7 +222,7 @@ TEST_F(Motion, TheEquilibriumOfACopyIsWhatIsFeltNow) {
     const TickResult felt = touch.go({0, 0, kBall - 1e-3}, 1e-3, ticks);
     const std::uint64_t before = hybrid::hash_state(0, touch.state());
     const double time_s = touch.state().clock.now_s();
-    const auto equilibrium = hybrid::equilibrium_force(touch.world(), touch.state());
+    const auto equilibrium = tests::equilibrium_force(touch.world(), touch.state());
     ASSERT_TRUE(equilibrium.has_value());
     EXPECT_LE(glm::length(*equilibrium - felt.force_N), 1e-3) << ticks;
     EXPECT_EQ(hybrid::hash_state(0, touch.state()), before) << "the state itself is not touched";
