@@ -29,7 +29,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using hybrid::Composed;
-using hybrid::ComposeError;
 using hybrid::ComposeOptions;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
