@@ -40,6 +40,7 @@ hybrid::Scene at_rate(hybrid::Scene scene, std::optional<double> rate_hz) {
 
 std::vector<std::string> texts_of(const std::vector<hybrid::BuildNote>& notes) {
   std::vector<std::string> texts;
+  texts.reserve(notes.size());
   for (const hybrid::BuildNote& note : notes)
     texts.push_back(note.object.empty() ? note.text : note.object + ": " + note.text);
   return texts;
@@ -132,8 +133,7 @@ void HostedSession::keep(double dt_s) noexcept {
   recorded_.push_back({felt_.device_m, hash_, device::DeviceFault::none, state.async.arrived,
                        live_ ? work_share_.steps() : std::uint8_t{0}});
   if (!at_start_) return;
-  course_.push_back({felt_.device_m,
-                     hybrid::coupling_N_per_m(*built_.world, state) * (felt_.proxy_m - felt_.device_m),
+  course_.push_back({felt_.device_m, hybrid::coupling_force_N(*built_.world, state, felt_.device_m),
                      presses_tissue(state)});
 }
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Writes OUT, a file of ctest's with one test for each suite of PROGRAM: NAME.SUITE, with the label `fast`. Its cases are those
-# that no pattern of SLOW names, and that are not disabled.
+# that no pattern of SLOW names, and that are not disabled. LIMIT_S: the time limit of each test (s).
 set(but_slow "*")
 if(SLOW)
   set(but_slow "-${SLOW}")
@@ -25,7 +25,7 @@ foreach(line IN LISTS lines)
       string(APPEND filter "-${SLOW}")
     endif()
     string(APPEND text "add_test([=[${NAME}.${suite}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${filter}]=])\n"
-           "set_tests_properties([=[${NAME}.${suite}]=] PROPERTIES LABELS fast TIMEOUT 1200 SKIP_REGULAR_EXPRESSION [=[${skipped}]=])\n")
+           "set_tests_properties([=[${NAME}.${suite}]=] PROPERTIES LABELS fast TIMEOUT ${LIMIT_S} SKIP_REGULAR_EXPRESSION [=[${skipped}]=])\n")
   endif()
 endforeach()
 file(WRITE ${OUT} "${text}")

@@ -29,11 +29,11 @@ inline bool data_are_expected() {
 }  // namespace tests
 
 // For use in a test. If the data are missing, the test returns, marked as failed or skipped.
-#define NEED_DATA(there, what_is_missing)                                                \
-  do {                                                                                   \
-    if (!(there) && tests::data_are_expected())                                          \
-      FAIL() << what_is_missing << "; HYBRID_EXPECT_DATA asks for it: install or unset"; \
-    if (!(there)) GTEST_SKIP() << "skipped: " << what_is_missing;                        \
+#define NEED_DATA(there, what_is_missing)                                                  \
+  do {                                                                                     \
+    if (!(there) && tests::data_are_expected())                                            \
+      FAIL() << (what_is_missing) << "; HYBRID_EXPECT_DATA asks for it: install or unset"; \
+    if (!(there)) GTEST_SKIP() << "skipped: " << (what_is_missing);                        \
   } while (false)
 
 #define SKIP_WITHOUT(folder)                                \

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstddef>
 #include <filesystem>
 #include <map>
@@ -292,6 +293,47 @@ TEST(HouseRules, NoTextNamesAPlaceOnSomeonesMachine) {
         EXPECT_EQ(file.lines[i].find(word), std::string::npos)
             << place(file, i) << "names " << word << ": use a path from the project's root";
       }
+    }
+  }
+}
+
+// Whether `word` stands in the code of a line: not in a comment at its end, nor within a longer word.
+bool has_word(std::string_view line, std::string_view word) {
+  const auto is_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+  line = line.substr(0, line.find("//"));
+  for (std::size_t at = line.find(word); at != std::string_view::npos; at = line.find(word, at + 1)) {
+    const std::size_t end = at + word.size();
+    if ((at == 0 || !is_word(line[at - 1])) && (end == line.size() || !is_word(line[end]))) return true;
+  }
+  return false;
+}
+
+TEST(HouseRules, WordsAreFoundInCode) {
+  EXPECT_TRUE(has_word("f(Image());", "Image"));
+  EXPECT_TRUE(has_word("SectionImage a = Image", "Image"));
+  EXPECT_FALSE(has_word("SectionImage a;  // an Image", "Image"));
+}
+
+// The name that a line such as `using polygon::Mesh;` declares; empty if there is none.
+std::string_view declared_by(std::string_view line) {
+  if (!line.starts_with("using ") || !line.ends_with(";")) return {};
+  line.remove_prefix(6);
+  line.remove_suffix(1);
+  if (line.find_first_of(" =") != std::string_view::npos) return {};  // a namespace, an enum or an alias
+  return line.substr(line.rfind(':') + 1);
+}
+
+// clang-tidy's check of this does not look into the batches of tests/tidy.sh. A header may declare names for
+// those who include it.
+TEST(HouseRules, EachUsingDeclarationIsUsed) {
+  for (const SourceFile& file : tree()) {
+    if (!is_cpp(file) || is_header(file)) continue;
+    for (std::size_t i = 0; i < file.lines.size(); ++i) {
+      const std::string_view word = declared_by(file.lines[i]);
+      if (word.empty()) continue;
+      const auto uses =
+          std::ranges::count_if(file.lines, [&](const std::string& other) { return has_word(other, word); });
+      EXPECT_GT(uses, 1) << place(file, i) << word << " is not used; delete the line";
     }
   }
 }

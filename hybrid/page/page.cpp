@@ -2,7 +2,10 @@
 #include "hybrid/page/page.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <ctime>
+#include <utility>
 
 #include "hybrid/base/letters.h"
 #include "hybrid/base/number_text.h"
@@ -114,7 +117,24 @@ void for_each_table(const Page& page, const Visit& visit) {
   }
 }
 
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M UTC", &utc)};
+}
+
 }  // namespace
+
+void set_provenance(Page& page, std::string command, const nlohmann::ordered_json& report) {
+  page.command = std::move(command);
+  page.version = report.value("version", "");
+  page.machine = report.value("machine", "");
+  page.build = report.value("build", "");
+  page.date = utc_now();
+  page.data = report;
+}
 
 PageCell number_cell(std::optional<double> value, int decimals) {
   if (!value || !std::isfinite(*value)) return {.text = "–"};

@@ -64,6 +64,10 @@ nlohmann::ordered_json page_json(const Page& page);
 std::string table_csv(const PageTable& table);
 std::string to_html(const Page& page);
 
+// Fills the entries at the end of the page: `command`, the time now, and version, machine and build from
+// `report`. `report` is the page's data too; it must begin with report_head().
+void set_provenance(Page& page, std::string command, const nlohmann::ordered_json& report);
+
 // Writes report.html, report.json, a CSV file for each table and a file for each figure into the folder. Each
 // file is written whole or not at all. Other files in the folder stay. Returns the files that were written,
 // report.html first. Throws std::runtime_error if a file is not writable.

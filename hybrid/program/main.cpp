@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The `hybrid` program: its commands and their options. Exit status: 0 done; 1 refused input, unequal replay
 // or violated invariant; 2 wrong usage; 128 plus the number of a signal that ended it.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
@@ -185,8 +187,9 @@ void refuse_unused(const CLI::App& bench, const std::string& suite) {
       continue;
     std::string takers;
     for (const std::string& taker : suites) takers.append("bench ").append(taker).append(", ");
-    throw CLI::ValidationError(std::string(option.name) + " has no effect in bench " + suite +
-                               "; leave it out, or use it with " + takers + "or bench all");
+    throw CLI::ValidationError(
+        fmt::format("{} has no effect in bench {}; leave it out, or use it with {}or bench all", option.name,
+                    suite, takers));
   }
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/program/report_page.h"
 
-#include <array>
-#include <ctime>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -16,14 +14,6 @@ std::string quoted_for_shell(std::string_view word) {
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return text + "'";
-}
-
-std::string utc_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  std::array<char, 32> text{};
-  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M UTC", &utc)};
 }
 
 }  // namespace
@@ -40,12 +30,7 @@ void ask_report(Outputs& outputs, const ReportRequest& request) {
 
 void write_report(Outputs& outputs, const ReportRequest& request, Page page,
                   const nlohmann::ordered_json& report) {
-  page.command = request.command;
-  page.version = report.value("version", "");
-  page.machine = report.value("machine", "");
-  page.build = report.value("build", "");
-  page.date = utc_now();
-  page.data = report;
+  set_provenance(page, request.command, report);
   outputs.attempt([&] { outputs.wrote("page", save_page(request.folder, page).front()); });
 }
 

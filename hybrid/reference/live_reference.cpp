@@ -18,7 +18,7 @@ PassedTick passed_tick(std::uint64_t tick, double t_s, const World& world, const
   return {.tick = tick,
           .t_s = t_s,
           .device_m = felt.device_m,
-          .coupling_N = coupling_N_per_m(world, state) * (felt.proxy_m - felt.device_m),
+          .coupling_N = coupling_force_N(world, state, felt.device_m),
           .soft = std::any_of(state.reactions.begin(), state.reactions.end(),
                               [](const voxel::Reaction& reaction) { return reaction.pressed > 0; })};
 }
@@ -40,7 +40,7 @@ ReferenceSession::ReferenceSession(const World& world, std::unique_ptr<WorldStat
 
 glm::dvec3 ReferenceSession::tick_at(const glm::dvec3& device_m) noexcept {
   const TickResult felt = haptic_tick(world_, *state_, {.position_m = device_m}, dt_s_);
-  return coupling_N_per_m(world_, *state_) * (felt.proxy_m - felt.device_m);
+  return coupling_force_N(world_, *state_, felt.device_m);
 }
 
 std::optional<ForceAtRest> ReferenceSession::follow(std::span<const PassedTick> passed) noexcept {

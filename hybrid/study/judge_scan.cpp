@@ -180,12 +180,12 @@ TunedScan tuned(const Scene& as_read, const StudyOptions& options, const fs::pat
     out.error_jnd = chosen.error.worst_jnd();
     out.p999_us = chosen.tick_us.p999;
     Page page = tune_page(result, folder.filename().string() + ": settings");
-    page.data = report_head("tune");
-    page.data.update(tune_json(result));
-    page.command = fmt::format("hybrid tune {} --cache {}{}", as_read.file.string(),
-                               (folder / "cache").string(), options.quick ? " --quick" : "");
-    page.version = page.data.value("version", "");
-    page.machine = page.data.value("machine", "");
+    auto report = report_head("tune");
+    report.update(tune_json(result));
+    set_provenance(page,
+                   fmt::format("hybrid tune {} --cache {}{}", as_read.file.string(),
+                               (folder / "cache").string(), options.quick ? " --quick" : ""),
+                   report);
     require_writable(folder / "tune" / kPageFile);  // makes the folder
     save_page(folder / "tune", page);
   } catch (const std::exception& error) {

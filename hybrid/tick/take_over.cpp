@@ -54,7 +54,7 @@ RestForce stand_still(const World& world, WorldState& state, int most_ticks, con
   for (int n = 1; n <= most_ticks && !rest.steady && !stop.load(std::memory_order_relaxed); ++n) {
     const TickResult felt = haptic_tick(world, state, still, 1e-3);
     if (n % kSteadyTicks != 0) continue;
-    const glm::dvec3 now = coupling_N_per_m(world, state) * (felt.proxy_m - felt.device_m);
+    const glm::dvec3 now = coupling_force_N(world, state, felt.device_m);
     rest.steady = glm::length(now - rest.force_N) <= std::max(kSteady_N, kSteadyShare * glm::length(now));
     rest.force_N = now;
   }

@@ -192,7 +192,7 @@ void make_safe(const World& world, WorldState& state, const glm::dvec3& force_N,
 // The hand feels the coupling, damping and texture alone; the parts and contacts are only recorded.
 void publish_force(const World& world, WorldState& state, const Sweep& sweep,
                    const device::DeviceState& input, double dt_s, TickResult& result) noexcept {
-  const glm::dvec3 coupling = coupling_N_per_m(world, state) * (state.proxy_m - result.device_m);
+  const glm::dvec3 coupling = coupling_force_N(world, state, result.device_m);
   const glm::dvec3 added = added_force(world, state, result.device_m, dt_s);
   result.proxy_m = state.proxy_m;
   result.rigid_N = sweep.force_N + added;

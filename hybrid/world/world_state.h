@@ -167,6 +167,11 @@ struct WorldState : CarriedState {
 inline double coupling_N_per_m(const World& world, const CarriedState& state) noexcept {
   return state.edited.coupling_N_per_m.value_or(world.tool.stiffness_N_per_m);
 }
+// The force of the virtual coupling on the hand.
+inline glm::dvec3 coupling_force_N(const World& world, const CarriedState& state,
+                                   const glm::dvec3& device_m) noexcept {
+  return coupling_N_per_m(world, state) * (state.proxy_m - device_m);
+}
 inline double max_force_N(const World& world, const CarriedState& state) noexcept {
   return state.edited.max_force_N.value_or(world.limits.max_force_N);
 }

@@ -139,7 +139,7 @@ int main(int argc, char** argv) {
   try {
     const std::vector<std::string> words(argv + 1, argv + argc);
     const int rounds = words.size() == 2 && words[0] == "--rounds" ? std::atoi(words[1].c_str()) : 301;
-    if ((words.size() != 0 && words.size() != 2) || rounds < 1) {
+    if ((!words.empty() && words.size() != 2) || rounds < 1) {
       std::fprintf(stderr, "usage: bench_interface [--rounds N]\n");
       return 2;
     }

@@ -2,6 +2,7 @@
 #include "hybrid/tick/proxy/proxy_surroundings.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -9,13 +10,12 @@
 namespace hybrid {
 namespace {
 
-// A survey that finds too many elements ends, and is repeated with the margin times kShrink, at most
-// kMaxShrinks times. If the last survey found few elements, its margin may have grown in free space. Then the
-// first kNarrow surveys may list only kMostOfGood times the target number. Those up to kCrowded list as many
-// as a neighbourhood usually holds. After that there must be the pole of a fan, where very many triangles
-// share a corner. Each kind of survey begins with the same margin.
-constexpr int kMaxShrinks = 23;
-constexpr int kNarrow = 3, kCrowded = 7;
+// A survey that finds more elements than it may list ends, and is repeated with the margin times kShrink.
+// After kTries such surveys it may list more, and begins with the first margin again. If the last survey
+// found few elements, its margin may have grown in free space. Then the first limit is kMostOfGood times the
+// target number. The next limit is the usual size of a neighbourhood. The last one is for the pole of a fan,
+// where very many triangles share a corner; it holds down to the smallest margin.
+constexpr int kTries = 3;
 constexpr double kMostOfGood = 4.0;  // (unit: the target number)
 constexpr double kShrink = 0.125;
 constexpr double kCentreAhead = 0.6;  // distance from the proxy to the centre of a survey (unit: margin)
@@ -111,21 +111,23 @@ bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool mov
     return near.near.survey(surface, view, apart, radius_, view);
   }
   const double margin = near.margin_m, good = good_count(margin);
-  for (int n = near.counted < good ? 0 : kNarrow; n < kMaxShrinks; ++n) {
-    if (n == kNarrow || n == kCrowded) near.margin_m = margin;
-    if (n >= kCrowded && near.margin_m < smallest) break;
-    const Reach reach = reach_of(near, view, moving);
-    const std::uint32_t most = n < kNarrow    ? static_cast<std::uint32_t>(kMostOfGood * good)
-                               : n < kCrowded ? polygon::Neighbourhood::kCapacity
-                                              : polygon::Neighbourhood::kCrowdedCapacity;
-    const bool complete = near.near.survey(surface, reach.centre, reach.margin, radius_, view, most);
-    ++surveys_;
-    work_ += kWorkOfSurvey + (complete ? near.near.size() : most);
-    if (complete) {
-      adapt_margin(near);
-      return true;
+  const std::array<std::uint32_t, 3> limits{static_cast<std::uint32_t>(kMostOfGood * good),
+                                            polygon::Neighbourhood::kCapacity,
+                                            polygon::Neighbourhood::kCrowdedCapacity};
+  for (std::size_t l = near.counted < good ? 0 : 1; l < limits.size(); ++l) {
+    near.margin_m = margin;
+    const bool last = l + 1 == limits.size();
+    for (int n = 0; last ? near.margin_m >= smallest : n < kTries; ++n) {
+      const Reach reach = reach_of(near, view, moving);
+      const bool complete = near.near.survey(surface, reach.centre, reach.margin, radius_, view, limits[l]);
+      ++surveys_;
+      work_ += kWorkOfSurvey + (complete ? near.near.size() : limits[l]);
+      if (complete) {
+        adapt_margin(near);
+        return true;
+      }
+      near.margin_m *= kShrink;
     }
-    near.margin_m *= kShrink;
   }
   near.margin_m = radius_ + 1e3 * rounding_;
   state_.faults |= fault_triangle_overflow;

@@ -127,7 +127,7 @@ RigidStep step_rigid(const World& world, WorldState& state, const glm::dvec3& de
     step.surveys = sweep.surveys;
   }
   step.proxy_m = state.proxy_m;
-  step.force_N = coupling_N_per_m(world, state) * (state.proxy_m - device_m);
+  step.force_N = coupling_force_N(world, state, device_m);
   return step;
 }
 

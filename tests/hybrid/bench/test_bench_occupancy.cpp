@@ -9,7 +9,6 @@
 
 namespace {
 
-using hybrid::bench::OccupancyEngine;
 using hybrid::bench::OccupancyPattern;
 using hybrid::bench::OccupancyRow;
 using hybrid::bench::OccupancyWhat;

@@ -263,7 +263,7 @@ TEST(BenchMeshes, BallsAreClosedAndEveryVertexLiesOnTheSphere) {
 TEST(BenchMeshes, CubeAndCorner) {
   for (const int n : {1, 64}) {
     const BenchMesh cube = make_bench_mesh("cube" + std::to_string(n));
-    EXPECT_EQ(cube.mesh.triangles.size(), static_cast<std::size_t>(12 * n * n));
+    EXPECT_EQ(cube.mesh.triangles.size(), 12U * n * n);
     expect_closed(cube.mesh);
     EXPECT_NEAR(volume(cube.mesh), 1e-3, 1e-15);
     EXPECT_DOUBLE_EQ(cube.inscribed_radius_m, kCubeHalf_m);
@@ -271,8 +271,8 @@ TEST(BenchMeshes, CubeAndCorner) {
 
     const BenchMesh corner = make_bench_mesh("corner" + std::to_string(n));
     EXPECT_FALSE(corner.solid);
-    EXPECT_EQ(corner.mesh.triangles.size(), static_cast<std::size_t>(6 * n * n));
-    EXPECT_EQ(corner.mesh.vertices.size(), static_cast<std::size_t>(3 * n * n + 3 * n + 1));
+    EXPECT_EQ(corner.mesh.triangles.size(), 6U * n * n);
+    EXPECT_EQ(corner.mesh.vertices.size(), 3U * n * n + 3U * n + 1U);
     double area = 0.0;
     for (const auto& [a, b, c] : corner.mesh.triangles) {
       const auto& v = corner.mesh.vertices;

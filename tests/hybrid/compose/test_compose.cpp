@@ -29,7 +29,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using hybrid::Composed;
-using hybrid::ComposeError;
 using hybrid::ComposeOptions;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -158,7 +157,7 @@ TEST_F(Compose, TissueThatTouchesNothingRigidIsHeldAndSpecksGo) {
   EXPECT_EQ(volume.voxel_count(), 35U * 16U * 16U) << "cropped to what is soft";
   // The liver has anchors too, at the bones, so that all tissue returns to rest.
   hybrid::BuiltScene built = hybrid::build_scene(scene);
-  EXPECT_GT(built.state->soft[0]->lattice().anchored_count(), static_cast<std::size_t>(8 * 16));
+  EXPECT_GT(built.state->soft[0]->lattice().anchored_count(), 8U * 16U);
 }
 
 TEST_F(Compose, WithoutBoneTissueIsHeldAtTheBack) {

@@ -55,7 +55,7 @@ Page hostile_page() {
                    hybrid::PageFigure{.name = std::string(name) + "-picture",
                                       .caption = "png",
                                       .alternative = hostile,
-                                      .png = "not really\0a png"}}});
+                                      .png = std::string("not really\0a png", 16)}}});
   }
   return page;
 }

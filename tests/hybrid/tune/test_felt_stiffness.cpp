@@ -10,7 +10,6 @@ namespace {
 
 using hybrid::CourseTick;
 using hybrid::ForceCourse;
-using hybrid::TickRange;
 
 constexpr double kDt_s = 1e-3, kCoupling = 800.0;
 

@@ -120,8 +120,8 @@ class Picture : public testing::Test {
   std::string why_not_;
 };
 
-#define DRAW_OR_SKIP(image, session, options) \
-  const Image image = draw(session, options); \
+#define DRAW_OR_SKIP(image, session, options)        \
+  const tests::Image image = draw(session, options); \
   if (!why_not_.empty()) GTEST_SKIP() << why_not_
 
 // The layout of the small picture. `seen_at` gives the pixel that shows a point, `framed` a camera that shows

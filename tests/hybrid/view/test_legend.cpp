@@ -21,7 +21,6 @@ namespace {
 using hybrid::Camera;
 using hybrid::DrawnObject;
 using hybrid::LegendRow;
-using tests::Image;
 using tests::Session;
 
 using DrawnSceneOf = tests::SceneFile;

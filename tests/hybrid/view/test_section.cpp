@@ -22,7 +22,6 @@
 namespace {
 
 using hybrid::Camera;
-using tests::Image;
 using tests::Session;
 using InsideOf = tests::SceneFile;
 using CutPicture = tests::Picture;

@@ -22,7 +22,6 @@ namespace {
 
 using hybrid::TissueColour;
 using hybrid::ViewSettings;
-using tests::Image;
 using TissueOfScan = tests::SceneFile;
 using SlicedPicture = tests::Picture;
 

@@ -18,7 +18,6 @@ namespace {
 
 using glm::dvec3;
 using polygon::finger_step;
-using polygon::FingerOptions;
 using polygon::FingerStep;
 using polygon::SweptHit;
 using polygon::TriangleMesh;

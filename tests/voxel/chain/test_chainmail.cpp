@@ -64,7 +64,7 @@ TEST(ChainMail, IsTheClampOfItsDefinition) {
   std::cout << settles << " settles of " << sources_in_all << " sources that moved " << moved
             << " voxels; largest error " << worst << ", largest violation " << worst_link
             << " of the largest displacement\n";
-  EXPECT_GT(settles, static_cast<std::size_t>(3 * scenes(1000)));
+  EXPECT_GT(settles, 3U * scenes(1000));
 }
 
 TEST(ChainMail, WhatCannotBeReachedGivesWayToAnchors) {
@@ -237,7 +237,7 @@ TEST(ChainMail, ADeepPushMovesAnOctahedron) {
     std::sort(once.begin(), once.end());
     EXPECT_EQ(std::adjacent_find(once.begin(), once.end()), once.end());
     // The moved rows run along x, one for each y and z of the octahedron.
-    EXPECT_EQ(once.size(), static_cast<std::size_t>(2 * n * n + 2 * n + 1));
+    EXPECT_EQ(once.size(), 2U * n * n + 2U * n + 1U);
     EXPECT_EQ(chain.moved_count(), 31 * once.size());
     EXPECT_LE(chain.work(), once.size());
   }

@@ -32,7 +32,7 @@ Lattice block_of_bricks(const tests::ReferenceRow& row) {
     options.materials[label].bricks = true;
   }
   voxel::LabelVolume volume = tests::reference_volume(row);
-  for (std::size_t n = 0; n < static_cast<std::size_t>(volume.dims[0] * volume.dims[1]); ++n)
+  for (std::size_t n = 0; n < static_cast<std::size_t>(volume.dims[0]) * volume.dims[1]; ++n)
     options.anchor_voxels.push_back(n);
   return Lattice(std::move(volume), options);
 }
@@ -115,7 +115,7 @@ Lattice lumps_of_bricks(unsigned seed) {
   voxel::LabelVolume volume;
   volume.dims = {kEdge, kEdge, kEdge};
   volume.spacing_m = glm::dvec3(2e-3);
-  volume.labels.assign(static_cast<std::size_t>(kEdge * kEdge * kEdge), 0);
+  volume.labels.assign(static_cast<std::size_t>(kEdge) * kEdge * kEdge, 0);
   for (int k = 0; k < kEdge; ++k) {
     for (int j = 0; j < kEdge; ++j) {
       for (int i = 0; i < kEdge; ++i) {

@@ -21,7 +21,6 @@ using tests::kSpacing;
 using tests::patches_against_all;
 using tests::PressedSquare;
 using voxel::CompositeGrid;
-using voxel::Lattice;
 using voxel::LinkMaterial;
 using Index3 = CompositeGrid::Index3;
 

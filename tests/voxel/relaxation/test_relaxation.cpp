@@ -32,7 +32,6 @@ using voxel::Displacement;
 using voxel::LabelVolume;
 using voxel::Lattice;
 using voxel::LatticeOptions;
-using voxel::LinkMaterial;
 using voxel::Relaxation;
 using voxel::VoxelId;
 

@@ -14,7 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 using tests::dicom_enhanced;
 using tests::dicom_slice;
-using tests::DicomPixels;
 using tests::DicomText;
 using tests::EnhancedFrame;
 using tests::refusal_of;

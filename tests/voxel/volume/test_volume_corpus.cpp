@@ -33,7 +33,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using tests::DicomSlice;
-using tests::refusal_of;
 using voxel::LabelVolume;
 
 class VolumeCorpus : public tests::VolumeFolder {};

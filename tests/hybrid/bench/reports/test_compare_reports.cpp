@@ -213,9 +213,9 @@ TEST(CompareReports, EveryKeyOfEveryRowIsKnown) {
   for (const auto& [suite, row] : rows) {
     const auto keys = hybrid::bench::keys_of(suite);
     for (const auto& [name, value] : row.items()) {
-      EXPECT_TRUE(
-          std::any_of(keys.begin(), keys.end(),
-                      [&](const auto& key) { return key.name.substr(0, key.name.find('.')) == name; }))
+      EXPECT_TRUE(std::any_of(
+          keys.begin(), keys.end(),
+          [&name = name](const auto& key) { return key.name.substr(0, key.name.find('.')) == name; }))
           << suite << '.' << name;
     }
     for (const auto& key : keys)

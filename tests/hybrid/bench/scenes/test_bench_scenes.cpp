@@ -34,13 +34,13 @@ class BenchScenes : public tests::SceneFile {
 
 void expect_known(const nlohmann::ordered_json& j, const std::string& prefix) {
   for (const auto& [key, value] : j.items()) {
+    const std::string name = prefix + key;
     if (value.is_object()) {
-      expect_known(value, prefix + key + ".");
+      expect_known(value, name + ".");
       continue;
     }
     const auto known = hybrid::bench::keys_of("scenes");
-    EXPECT_TRUE(std::ranges::any_of(known, [&](const auto& k) { return k.name == prefix + key; }))
-        << prefix + key;
+    EXPECT_TRUE(std::ranges::any_of(known, [&](const auto& k) { return k.name == name; })) << name;
   }
 }
 

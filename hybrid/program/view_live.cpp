@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The live window: a session on a thread of its own (live_session.h).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <utility>
+
+#include "device/loop/stop_signal.h"
+#include "hybrid/program/outputs.h"
+#include "hybrid/program/view_files.h"
+#include "hybrid/program/view_steps.h"
+#include "hybrid/session/live_session.h"
+#include "hybrid/window/frame_meter.h"
+
+namespace hybrid {
+namespace {
+
+// Keeps the forces between objects for the window's list. To compute them the session is held for a moment:
+// a simulated hand does not notice, because held time does not count. A real hand would, so with a real
+// device they are computed only while the session is paused.
+class PressWatch {
+ public:
+  const std::vector<PairPress>& presses(const WindowInput& input, const PlayRequest& request,
+                                        const Player& player, LiveSession& session, std::uint64_t tick) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!input.wants_presses || (player.is_real() && !request.paused)) {
+      presses_.clear();
+      tick_ = kNever;
+    } else if (tick != tick_ && now >= next_ && session.hold(request)) {
+      presses_ = player.presses();
+      session.ask(request);
+      tick_ = tick;
+      const auto end = std::chrono::steady_clock::now();
+      next_ = end + std::max<std::chrono::steady_clock::duration>(kEvery, kRest * (end - now));
+    }
+    return presses_;
+  }
+
+ private:
+  static constexpr std::uint64_t kNever = ~std::uint64_t{0};
+  static constexpr std::chrono::milliseconds kEvery{200};  // least time between two updates of the list
+  static constexpr int kRest = 19;  // the session is held for at most one part in 20 of the time
+  std::vector<PairPress> presses_;
+  std::uint64_t tick_ = kNever;  // of presses_
+  std::chrono::steady_clock::time_point next_{};
+};
+
+// The window of a session, with the user's files, script and reloads of the scene.
+struct LiveWindow {
+  const ViewCommand& command;
+  Window& window;
+  ViewFiles files;
+  ViewScript script;
+  SceneReload reload;
+  SceneChanger changer;
+  ChangeComparison comparison{};
+  FrameMeter meter{};
+  std::string lost{};  // why the window cannot be shown any more; empty: it can
+  std::optional<ChangeEffect> effect{};
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+};
+
+SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
+  SessionNotes notes = notes_of(player, t_s, live.files.message(), live.effect);
+  notes.building = live.changer.building();
+  if (!notes.building.empty()) notes.message = notes.building + "; the session goes on meanwhile";
+  if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
+  PastView::add_notes(player, t_s, notes);
+  if (!live.reload.error().empty())
+    notes.error = live.reload.error() + "\nThe session goes on with the scene as it was.";
+  return notes;
+}
+
+// Goes on in a changed scene when it is built. Returns whether it did.
+bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, LiveSession& session,
+                        const PlayRequest& request) {
+  try {
+    auto next = live.changer.poll(*viewed);
+    if (next == nullptr) return false;
+    ChangeMade made;
+    session.change(request, [&] {
+      made = viewed->player->change_scene(next->scene, next->built, next->drawn, next->text);
+    });
+    live.effect = show_changed(live.window, viewed, std::move(next), std::move(made), live.comparison);
+    return true;
+  } catch (const std::exception& e) {
+    live.files.say(std::string("The scene is as it was: ") + e.what());
+    return false;
+  }
+}
+
+void go_back(LiveWindow& live, LiveSession& session, const PlayRequest& request, Player& player,
+             std::size_t kept) {
+  try {
+    session.change(request, [&] { player.go_back(kept); });
+    PastView::leave(live.window);
+  } catch (const std::exception& e) {
+    live.files.say(std::string("The session goes on as it was: ") + e.what());
+  }
+}
+
+// Keeps the session's state when it is time. The session stands still for at most one part in 20 of the time.
+void keep_state(LiveSession& session, const PlayRequest& request, Player& player, double now_s,
+                std::chrono::steady_clock::time_point& next) {
+  constexpr int rest = 19;
+  const auto begin = std::chrono::steady_clock::now();
+  if (begin < next || request.paused || !player.keeps_at(now_s)) return;
+  session.between_ticks(request, [&] { player.keep_state(); });
+  const auto end = std::chrono::steady_clock::now();
+  next = end + rest * (end - begin);
+}
+
+// Runs the window on this thread and the session on another. Ends when the window closes, or when a changed
+// scene is ready in `next`. Returns the device's events.
+device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, BlackBox& box,
+                               std::unique_ptr<ViewedScene>& next) {
+  LiveSession session(*viewed->player, box);
+  Player& player = *viewed->player;
+  Snapshot shown;
+  PressWatch watch;
+  PastView past;
+  RestWish rest;
+  auto keep_next = std::chrono::steady_clock::now();
+  bool open = true;
+  while (open && !session.ended() && next == nullptr) {
+    live.meter.begin(session.processor_time_s());
+    live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
+                     live.window);
+    const WindowInput input = live.window.take_input();
+    PlayRequest request = request_of(input);
+    for (const Edit& edit : input.edits) player.edit(edit);
+    if (player.is_real() && !input.changes.empty())
+      live.files.say("The scene is as it was: with a real device it does not change while it is felt.");
+    for (const SceneChange& change : input.changes) {
+      if (!player.is_real()) live.changer.ask(change);
+    }
+    if (take_changed_scene(live, viewed, session, request)) {
+      request.asked = nullptr;
+      watch = {};
+    }
+    rest.follow(input.compares_with_rest, player, live.files,
+                [&](const auto& change) { session.between_ticks(request, change); });
+    if (auto forces = live.comparison.poll()) live.effect->forces = forces;
+    const auto back = PastView::shown(player, shown.t_s, input.back_s);
+    if (back && input.go_on) {
+      go_back(live, session, request, player, *back);
+      request.asked = nullptr;
+    }
+    const bool shows_past = back && !input.go_on;
+    if (!shows_past) past.forget();  // kept states come and go
+    request.paused = request.paused || shows_past;
+    session.ask(request);
+    if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
+    session.shown(viewed->drawn, shown);
+    shown.presses = watch.presses(input, request, player, session, shown.tick);
+    live.window.add_ticks(player.samples(), player.at_rest());
+    try {
+      open = live.window.frame(
+          shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),
+          notes_of(live, player, shown.t_s));
+    } catch (const std::exception& e) {
+      live.lost = e.what();
+      break;
+    }
+    live.files.save_what_was_asked(live.window, input, *viewed, shown, [&] { return session.hold(request); });
+    if (input.reload) live.reload.ask();
+    if (!player.is_real()) next = live.reload.poll();
+    live.meter.end(session.processor_time_s());
+  }
+  live.comparison.cancel();
+  return session.stop();
+}
+
+// Plays a scene, and the new scene each time that the scene's file has changed.
+device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> viewed, BlackBox& box) {
+  for (;;) {
+    std::unique_ptr<ViewedScene> next;
+    device::ServoReport report = play_scene(live, viewed, box, next);
+    if (next == nullptr) {
+      if (!live.files.save_at_end(*viewed)) report.messages.emplace_back("the session was not recorded");
+      return report;
+    }
+    live.changer.cancel();
+    live.effect.reset();
+    live.window.show_scene(next->drawn);
+    viewed = std::move(next);
+    print_notes(viewed->built);
+    if (live.files.message().empty()) live.files.say("The scene was loaded again.");
+  }
+}
+
+}  // namespace
+
+int play_live(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
+              ViewScript script) {
+  const auto kept = open_black_box_file({}, command.scene, true, viewed->scene.rate_hz);
+  LiveWindow live{command,
+                  window,
+                  ViewFiles(command),
+                  std::move(script),
+                  SceneReload(command, viewed->text),
+                  SceneChanger(command)};
+  const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
+  fmt::print("{}\n", live.meter.in_words());
+  if (!live.lost.empty()) fmt::print(stderr, "the session ended: {}\n", live.lost);
+  print_fault(*kept);
+  for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
+  if (report.end == device::ServoEnd::stopped) return exit_status_of_signal(device::stop_signal());
+  return report.end == device::ServoEnd::lost || !live.lost.empty() ? 1 : 0;
+}
+
+}  // namespace hybrid

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the two ways to show a session share: frames of fixed time (view_frames.cpp) and a live window
+// (view_live.cpp). Both play one session, change its scene, and look back at states that it kept.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "hybrid/program/commands.h"
+#include "hybrid/program/viewed_scene.h"
+#include "hybrid/window/view_script.h"
+#include "hybrid/window/window.h"
+
+namespace hybrid {
+
+// Plays frames that each cover a fixed time, so that the pictures are the same on any machine. Returns the
+// exit status.
+[[nodiscard]] int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
+                              ViewScript& script);
+// Plays the session in a window until it is closed. Returns the exit status.
+[[nodiscard]] int play_live(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
+                            ViewScript script);
+
+// Converts the window's input to a request for the session.
+[[nodiscard]] PlayRequest request_of(const WindowInput& input);
+
+[[nodiscard]] SessionNotes notes_of(const Player& player, double t_s, const std::string& message,
+                                    const std::optional<ChangeEffect>& effect);
+
+// Shows the scene in which the session goes on. The one before is kept until the forces of both are compared.
+[[nodiscard]] ChangeEffect show_changed(Window& window, std::unique_ptr<ViewedScene>& viewed,
+                                        std::unique_ptr<ViewedScene> next, ChangeMade made,
+                                        ChangeComparison& comparison);
+
+// The past states that the window shows, and from which the session goes on.
+class PastView {
+ public:
+  // Fills the notes with the kept states. `now_s`: time of the session.
+  static void add_notes(const Player& player, double now_s, SessionNotes& notes);
+  // The kept state that is shown; empty: the present.
+  [[nodiscard]] static std::optional<std::size_t> shown(const Player& player, double now_s, double back_s);
+  // The picture of that state. It is filled again only if the state or the points are other ones.
+  const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked);
+  // Call when the kept states are other ones.
+  void forget() { state_ = nullptr; }
+  // The window shows the present again.
+  static void leave(Window& window);
+
+ private:
+  const WorldState* state_ = nullptr;  // of snapshot_
+  Snapshot snapshot_;
+};
+
+}  // namespace hybrid
