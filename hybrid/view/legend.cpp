@@ -141,8 +141,8 @@ std::vector<PairPress> pairs_by_force(const DrawnScene& scene, const Snapshot& s
 
 LegendRow pair_row(const DrawnScene& scene, const PairPress& pair) {
   const bool anchors = pair.other == PairPress::kAnchors;
-  std::vector<glm::vec3> colours{palette::of_object(scene, pair.soft)};
-  if (!anchors) colours.push_back(palette::of_object(scene, pair.other));
+  std::vector<glm::vec3> colours = palette::of_materials(scene, pair.soft);
+  if (!anchors) colours = {colours.front(), palette::of_materials(scene, pair.other).front()};
   return {.swatch = stripes(colours),
           .name = scene.objects[pair.soft].name + " – " +
                   (anchors ? "its anchors" : scene.objects[pair.other].name),
