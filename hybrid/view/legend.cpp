@@ -144,11 +144,10 @@ std::vector<PairPress> pairs_by_force(const DrawnScene& scene, const Snapshot& s
 
 // Both names, of which the longer one is cut: a row that is cut at its end would show only the first.
 std::string names_of_pair(const std::string& a, const std::string& b) {
-  constexpr std::size_t kHalf = kPairLetters / 2;
-  const auto left_by = [](const std::string& other) {
-    return kPairLetters - std::min(letters(other), kHalf);
+  const auto beside = [](const std::string& other) {
+    return kPairLetters - std::min(letters(other), kPairLetters / 2);
   };
-  return shortened(a, left_by(b)) + " – " + shortened(b, left_by(a));
+  return shortened(a, beside(b)) + " – " + shortened(b, beside(a));
 }
 
 LegendRow pair_row(const DrawnScene& scene, const PairPress& pair) {

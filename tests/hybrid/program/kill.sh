@@ -112,21 +112,22 @@ killed() {
 
 kinds=(KILL TERM INT)
 
-# short_mode COMMAND…: the first two runs are not killed, so that the others find their files. The moments lie in the
-# time that the shorter of the two took, every second one in its last third, because most files are written there.
+# short_mode COMMAND…: the first run is not killed, so that the others find its files. Every second moment is in the
+# last third of the time that a run takes, because most files are written there. That time follows the machine's load:
+# it shrinks after a signal that came too late, and grows after one that came in time.
 short_mode() {
-  local n start took_s=1000 delay_s
-  for n in 1 2; do
-    start=$EPOCHREALTIME
-    "$@" > run.log 2>&1 || fail "$mode: status $? of run $n: $(tail -n 3 run.log)"
-    took_s=$(awk -v a="$start" -v b="$EPOCHREALTIME" -v m="$took_s" 'BEGIN { t = b - a; print (t < m ? t : m) }')
-    check_files "$mode, not killed" TERM
-    [ -n "$(find out -type f)" ] || fail "$mode: run $n left nothing: $(cat run.log)"
-  done
+  local n start took_s delay_s in_time
+  start=$EPOCHREALTIME
+  "$@" > run.log 2>&1 || fail "$mode: status $? of the first run: $(tail -n 3 run.log)"
+  took_s=$(awk -v a="$start" -v b="$EPOCHREALTIME" 'BEGIN { print b - a }')
+  check_files "$mode, not killed" TERM
+  [ -n "$(find out -type f)" ] || fail "$mode: the first run left nothing: $(cat run.log)"
   for ((n = 0; n < kills; ++n)); do
     delay_s=$(awk -v took="$took_s" -v part="$RANDOM" -v late="$((n / 3 % 2))" \
       'BEGIN { r = part / 32768; print took * (late ? 0.67 + 0.4 * r : r) }')
+    in_time=$reached
     killed "$mode" "${kinds[n % 3]}" "$delay_s" "$@"
+    took_s=$(awk -v took="$took_s" -v late="$((reached == in_time))" 'BEGIN { print took * (late ? 0.8 : 1.03) }')
   done
 }
 
@@ -135,7 +136,8 @@ long_mode() {
   local longest_s=$1 n
   shift
   for ((n = 0; n < kills; ++n)); do
-    killed "$mode" "${kinds[n % 3]}" "$(awk -v m="$longest_s" -v part="$RANDOM" 'BEGIN { print m * part / 32768 }')" "$@"
+    killed "$mode" "${kinds[n % 3]}" \
+      "$(awk -v most="$longest_s" -v part="$RANDOM" 'BEGIN { print most * part / 32768 }')" "$@"
   done
 }
 
