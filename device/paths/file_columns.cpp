@@ -249,10 +249,12 @@ class Finder {
     out_.has_row = is_row_of_numbers(line_, out_.separator);
     if (!measured_.columns.empty()) {
       by_user(stated);
+    } else if (by_comment()) {
+      out_.has_row = true;
     } else if (!out_.has_row) {
       by_heading(stated);
     } else {
-      by_comment_or_count();
+      by_count();
     }
     for (const auto& column : out_.role) out_.needed = std::max(out_.needed, column ? column->index + 1 : 0);
     return std::move(out_);
@@ -308,14 +310,28 @@ class Finder {
     if (!out_.has_row) out_.has_row = reader_.next(line_);
   }
 
-  void by_comment_or_count() {
+  // Takes the names from the comment above the first row, if it has a name for each field, and the row has
+  // numbers where they are needed. Other fields may hold text.
+  bool by_comment() {
     std::vector<std::string_view> fields;
     (void)split_fields(line_, out_.separator, fields);
     for (const Separator separator : kSeparators) {
       const Names names = names_in(reader_.comment(), separator);
-      if (names.size() != fields.size() || !NamedColumns(measured_, names).problem.empty()) continue;
-      return take(names, reader_.line());
+      if (names.size() != fields.size()) continue;
+      const NamedColumns named(measured_, names);
+      const bool fits = std::all_of(named.role.begin(), named.role.end(), [&](const auto& column) {
+        return !column || looks_like_number(fields[column->index]);
+      });
+      if (!named.problem.empty() || !fits) continue;
+      take(names, reader_.line());
+      return true;
     }
+    return false;
+  }
+
+  void by_count() {
+    std::vector<std::string_view> fields;
+    (void)split_fields(line_, out_.separator, fields);
     if (measured_.as_path) {
       reader_.refuse("a row of numbers without a heading; " + how_to_name(measured_));
     }

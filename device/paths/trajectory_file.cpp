@@ -73,8 +73,10 @@ class RowReader {
       note("without times; taken as " + short_number(measured_.rate_hz) +
            " samples a second (--rate states another)");
     }
-    if (!measured_.as_path && !columns_.role[role_x]->unit_is_stated) {
-      note("its lengths state no unit; taken as mm (x_mm in the heading states it)");
+    if (!columns_.role[role_x]->unit_is_stated) {
+      note("its lengths state no unit; taken as " +
+           (measured_.as_path ? "the scene's, " + short_number(1e3 * measured_.unit_m) + " mm" : "mm") +
+           " (x_mm in the heading states it)");
     }
   }
 

@@ -15,9 +15,10 @@
 namespace hybrid {
 namespace {
 
-constexpr char kBlanks = ' ';            // as a separator it stands for any number of spaces and tabs
-constexpr std::size_t kLeastColour = 3;  // red, green, blue
-constexpr std::size_t kMostColour = 4;   // and opacity
+constexpr char kBlanks = ' ';  // as a separator it stands for any number of spaces and tabs
+constexpr std::string_view kSeparators = ",;\t:=";  // other than blanks; the last two after a number alone
+constexpr std::size_t kLeastColour = 3;             // red, green, blue
+constexpr std::size_t kMostColour = 4;              // and opacity
 
 struct RowField {
   std::string text;
@@ -88,22 +89,6 @@ std::vector<RowField> fields_of(std::string_view row, char separator) {
   return fields;
 }
 
-// The separator after the first field of a row.
-char separator_after_first(std::string_view row) {
-  const std::size_t closing = row.starts_with('"') ? row.find('"', 1) : std::string_view::npos;
-  row.remove_prefix(closing != std::string_view::npos ? closing + 1
-                                                      : std::min(row.find_first_of(",;\t "), row.size()));
-  row.remove_prefix(std::min(row.find_first_not_of(' '), row.size()));
-  const bool given = !row.empty() && (row.front() == ',' || row.front() == ';' || row.front() == '\t');
-  return given ? row.front() : kBlanks;
-}
-
-// The separator and the columns of a table that has a heading.
-struct RowColumns {
-  char separator = ',';
-  std::size_t label = 0, name = 1;
-};
-
 std::string column_word(std::string_view text) {
   std::string word;
   for (const char c : text) {
@@ -112,6 +97,26 @@ std::string column_word(std::string_view text) {
   }
   return word;
 }
+
+// The separator after the first field of a row.
+char separator_after_first(std::string_view row) {
+  const std::size_t closing = row.starts_with('"') ? row.find('"', 1) : std::string_view::npos;
+  row.remove_prefix(closing != std::string_view::npos ? closing + 1
+                                                      : std::min(row.find_first_of(",;:=\t "), row.size()));
+  row.remove_prefix(std::min(row.find_first_not_of(' '), row.size()));
+  return !row.empty() && kSeparators.find(row.front()) != std::string_view::npos ? row.front() : kBlanks;
+}
+
+// A line like "sep=;", which spreadsheets write first.
+bool states_separator(std::string_view row) {
+  return row.size() == 5 && column_word(row) == "sep" && row[3] == '=';
+}
+
+// The separator and the columns of a table that has a heading.
+struct RowColumns {
+  char separator = ',';
+  std::size_t label = 0, name = 1;
+};
 
 // Reads a row as a heading; empty if it is none. Words are listed in order of preference, because "label" is
 // the number in one table and the name in another.
@@ -162,7 +167,7 @@ class RowReader {
       const std::string_view row = text.substr(0, text.find('\n'));
       text.remove_prefix(std::min(row.size() + 1, text.size()));
       const std::string_view content = without_blanks(row);
-      if (content.empty()) continue;
+      if (content.empty() || (rows_.empty() && !columns_ && states_separator(content))) continue;
       const bool in_columns = columns_ && columns_->separator != kBlanks;
       if (content.front() == '#' && !(in_columns && begins_with_colour(row))) continue;
       if (in_columns) {

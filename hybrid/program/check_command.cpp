@@ -144,7 +144,7 @@ void check_volume_file(const std::filesystem::path& path, Json& file) {
   const std::uint64_t bytes = soft_load_bytes(h.dims);
   file["touch_bytes"] = bytes;
   file["summary"] = fmt::format(
-      "{}, {} x {} x {} {}, {:.3g} x {:.3g} x {:.3g} mm, {:.6g} to {:.6g}{}; about {:.0f} MB to touch as it "
+      "{}, {} x {} x {} {}, {:.3g} x {:.3g} x {:.3g} mm, {:.6g} to {:.6g}{}; about {:.1f} MB to touch as it "
       "is, {:.0f} MB where it has been touched everywhere",
       h.format, h.dims[0], h.dims[1], h.dims[2], h.component, h.spacing_m.x * 1e3, h.spacing_m.y * 1e3,
       h.spacing_m.z * 1e3, s.minimum, s.maximum,

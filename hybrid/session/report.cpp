@@ -177,7 +177,7 @@ std::string safety_words(const BuiltScene& built) {
   return text;
 }
 
-// An object's force that is this many times the greatest felt force was cut by the limits of the force.
+// An object's force that is this many times the greatest felt force was opposed by another's, or limited.
 constexpr double kBeyondFelt = 1.01;
 constexpr std::array kPairKinds{"rigid", "soft", "anchors"};  // ObjectPair::Kind
 
@@ -221,9 +221,11 @@ nlohmann::ordered_json between_json(const World& world, const ForcesCourse& betw
   return j;
 }
 
-std::string between_words(const World& world, const ForcesCourse& between) {
+std::string between_words(const World& world, const ForcesCourse& between, std::uint64_t ticks) {
   if (between.pairs.empty()) return {};
-  std::string text = fmt::format("forces between objects, at {} moments:\n", between.samples);
+  std::string text = between.samples < ticks
+                         ? fmt::format("forces between objects, in {} of {} ticks:\n", between.samples, ticks)
+                         : "forces between objects, in every tick:\n";
   for (const PairCourse& course : between.pairs) {
     const std::string most = course.known_samples > 0
                                  ? fmt::format("at most {:.3f} N at {:.3f} s", course.max_N, course.max_t_s)
@@ -233,8 +235,10 @@ std::string between_words(const World& world, const ForcesCourse& between) {
     text += fmt::format("  {:<16} {:<16} {}; at the end {}", world.soft[course.pair.soft].name,
                         other_name(world, course.pair), most, end);
     const std::uint64_t unknown = course.samples - course.known_samples;
-    text += unknown > 0 ? fmt::format(" (unknown at {} of {} moments: links at their limits carry load)\n",
-                                      unknown, course.samples)
+    text += unknown > 0 ? fmt::format(
+                              " (not known in {} of the {} ticks in which they touch: links at "
+                              "their limits carry load)\n",
+                              unknown, course.samples)
                         : "\n";
   }
   return text;
@@ -363,8 +367,8 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
   if (most_N > kBeyondFelt * result.max_force_N)
     text +=
         "forces by object are those before the limits of the force (soft start, slew, the device's "
-        "maximum)\n";
-  text += between_words(*built.world, result.between);
+        "maximum), and where they oppose, the hand feels their difference\n";
+  text += between_words(*built.world, result.between, result.ticks);
   if (result.contact_ticks == 0) {
     text += "nothing was touched: does the [path] lead to an object? They lie in\n";
     for (std::size_t o = 0; o < built.world->object_count(); ++o) {
@@ -378,8 +382,8 @@ std::string run_summary(const BuiltScene& built, SessionResult& result) {
   if (result.async_results > 0) {
     const double seconds = static_cast<double>(result.ticks) * result.dt_s;
     text += fmt::format(
-        "processor time by thread: servo {:.1f} %, relaxation {:.1f} % of the session's{}; its results were "
-        "taken {} times\n",
+        "processor time by thread: servo {:.1f} %, relaxation {:.1f} % of the session's{}; results of "
+        "relaxation were taken {} times\n",
         100.0 * result.servo_s / seconds, 100.0 * result.relaxation_s / seconds,
         result.realtime_note.empty() ? " (simulated: one core did both in turns)" : "", result.async_results);
   }

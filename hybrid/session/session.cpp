@@ -242,8 +242,10 @@ class Run {
       result_.object_max_force_N[o] = std::max(result_.object_max_force_N[o], state_.feel[o].force_N);
       if (options_.keep_rows) result_.object_force_N[o].push_back(state_.feel[o].force_N);
     }
-    for (std::size_t o = 0; o < world_.soft.size(); ++o)
-      felt_.add(world_, state_, o, state_.feel[world_.rigid.size() + o].force_N);
+    for (std::size_t o = 0; o < world_.soft.size(); ++o) {
+      const ObjectFeel& feel = state_.feel[world_.rigid.size() + o];
+      if (feel.contact) felt_.add(world_, state_, o, feel.force_N);
+    }
     if (!options_.keep_rows) return;
     result_.rows.push_back({static_cast<double>(tick) * dt_, felt.device_m, felt.proxy_m, felt.force_N,
                             glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts,

@@ -10,6 +10,7 @@
 #include <span>
 #include <utility>
 
+#include "hybrid/base/letters.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
 #include "polygon/mesh/is_finite.h"
@@ -22,6 +23,8 @@ constexpr std::size_t kMostSingly = 6;  // if more rigid objects are untouched, 
 constexpr std::size_t kMostMaterials = palette::material.size() + 1;
 constexpr std::size_t kMostStripes = 4;  // greatest number of colours of one swatch
 constexpr std::size_t kMostPairs = 4;    // greatest number of rows for pairs of objects
+// Characters of the two names of a pair: about as many as fit beside a force.
+constexpr std::size_t kPairLetters = 22;
 
 std::string and_more(std::size_t count) {
   return "and " + std::to_string(count) + " more";
@@ -139,13 +142,21 @@ std::vector<PairPress> pairs_by_force(const DrawnScene& scene, const Snapshot& s
   return pairs;
 }
 
+// Both names, of which the longer one is cut: a row that is cut at its end would show only the first.
+std::string names_of_pair(const std::string& a, const std::string& b) {
+  const auto beside = [](const std::string& other) {
+    return kPairLetters - std::min(letters(other), kPairLetters / 2);
+  };
+  return shortened(a, beside(b)) + " – " + shortened(b, beside(a));
+}
+
 LegendRow pair_row(const DrawnScene& scene, const PairPress& pair) {
   const bool anchors = pair.other == PairPress::kAnchors;
-  std::vector<glm::vec3> colours{palette::of_object(scene, pair.soft)};
-  if (!anchors) colours.push_back(palette::of_object(scene, pair.other));
+  std::vector<glm::vec3> colours = palette::of_materials(scene, pair.soft);
+  if (!anchors) colours = {colours.front(), palette::of_materials(scene, pair.other).front()};
   return {.swatch = stripes(colours),
-          .name = scene.objects[pair.soft].name + " – " +
-                  (anchors ? "its anchors" : scene.objects[pair.other].name),
+          .name = names_of_pair(scene.objects[pair.soft].name,
+                                anchors ? "its anchors" : scene.objects[pair.other].name),
           .force = pair.force_N ? force_text(*pair.force_N) : "not known",
           .within = true};
 }

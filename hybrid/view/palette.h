@@ -42,12 +42,13 @@ inline constexpr float kOwnUntil = 0.02F, kRampFrom = 0.15F;  // shares of the s
 
 inline constexpr std::array<glm::vec3, 4> rigid{
     {{0.89F, 0.84F, 0.72F}, {0.78F, 0.77F, 0.74F}, {0.80F, 0.71F, 0.55F}, {0.66F, 0.68F, 0.72F}}};
+// Colours of soft objects. Those near the scale `moved` come last.
 inline constexpr std::array<glm::vec3, 6> soft{{{0.86F, 0.58F, 0.62F},
-                                                {0.30F, 0.66F, 0.62F},
                                                 {0.58F, 0.53F, 0.82F},
-                                                {0.52F, 0.72F, 0.36F},
+                                                {0.75F, 0.48F, 0.72F},
                                                 {0.36F, 0.62F, 0.85F},
-                                                {0.75F, 0.48F, 0.72F}}};
+                                                {0.52F, 0.72F, 0.36F},
+                                                {0.30F, 0.66F, 0.62F}}};
 
 // Colours of the materials of one object. A search in Oklab maximised the least distance between any two
 // colours, and their distance to the colours above. It did so for normal vision and for vision without the

@@ -42,7 +42,9 @@ std::vector<std::string> words_of(const FilePlace& place, int width, int height,
           place.temporary};
 }
 
-// Starts ffmpeg with the reading end of the pipe as its standard input. Returns an error number, or 0.
+// Starts ffmpeg with the reading end of the pipe as its standard input. It has a process group of its own: a
+// terminal sends Ctrl-C to the whole group of the program, and ffmpeg has to write the frames up to then.
+// Returns an error number, or 0.
 int start(const std::vector<std::string>& words, int input, pid_t& process) {
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
@@ -51,7 +53,12 @@ int start(const std::vector<std::string>& words, int input, pid_t& process) {
   posix_spawn_file_actions_t actions{};
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
-  const int error = posix_spawnp(&process, kFfmpeg, &actions, nullptr, arguments.data(), environ);
+  posix_spawnattr_t attributes{};
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  const int error = posix_spawnp(&process, kFfmpeg, &actions, &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   return error;
 }

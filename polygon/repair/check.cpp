@@ -115,7 +115,7 @@ void check_edges(const Connected& c, const EdgeTable& edges, MeshCheck& check) {
   add_finding(
       check.findings, "M07-inconsistent-orientation", Severity::warning, against,
       "edges are run through in the same direction by two triangles, one of which is turned over. Repair "
-      "orients them");
+      "orients them, where the surface has two sides");
   check.nonmanifold_edges = nonmanifold.count;
   check.turned_edges = against.count;
 }

@@ -33,8 +33,9 @@ std::string text_of(const gdcm::DataSet& set, const Tag& tag) {
   return text;
 }
 
-// The numbers of a decimal string; empty if any entry is not a number.
-std::vector<double> numbers_of(const gdcm::DataSet& set, const Tag& tag) {
+// The numbers of a decimal string; empty if there is no such element, or nothing in it. Throws VolumeError if
+// an entry is not a number, such as 0,7 with a decimal comma.
+std::vector<double> numbers_of(const fs::path& path, const gdcm::DataSet& set, const Tag& tag) {
   const std::string text = text_of(set, tag);
   std::vector<double> values;
   const char* at = text.c_str();
@@ -42,7 +43,11 @@ std::vector<double> numbers_of(const gdcm::DataSet& set, const Tag& tag) {
     const char* end = nullptr;
     values.push_back(number_at(at, &end));
     while (*end == ' ') ++end;
-    if (end == at || !std::isfinite(values.back()) || (*end != '\0' && *end != '\\')) return {};
+    if (end == at || !std::isfinite(values.back()) || (*end != '\0' && *end != '\\')) {
+      const std::string name = tag.PrintAsContinuousString();
+      refuse_volume(path, "DICOM element (", name.substr(0, 4), ",", name.substr(4), ") holds '", text,
+                    "', where numbers are needed; ", kDamaged);
+    }
     at = *end == '\0' ? end : end + 1;
   }
   return values;
@@ -68,19 +73,19 @@ class DicomItems {
 // one that all frames share.
 class FrameElements {
  public:
-  explicit FrameElements(const gdcm::DataSet& set)
-      : set_(set), shared_(set, Tag(0x5200, 0x9229)), each_(set, Tag(0x5200, 0x9230)) {}
+  FrameElements(const fs::path& path, const gdcm::DataSet& set)
+      : path_(path), set_(set), shared_(set, Tag(0x5200, 0x9229)), each_(set, Tag(0x5200, 0x9230)) {}
 
   [[nodiscard]] bool in_groups() const { return shared_.size() > 0 || each_.size() > 0; }
   [[nodiscard]] std::size_t frames() const { return each_.size(); }
 
   [[nodiscard]] std::vector<double> numbers(std::size_t frame, const Tag& group, const Tag& tag) const {
-    if (!in_groups()) return numbers_of(set_, tag);
+    if (!in_groups()) return numbers_of(path_, set_, tag);
     for (const gdcm::DataSet* outer : {each_.at(frame), shared_.at(0)}) {
       if (outer == nullptr) continue;
       const DicomItems inner(*outer, group);
       if (inner.size() == 0) continue;
-      std::vector<double> values = numbers_of(*inner.at(0), tag);
+      std::vector<double> values = numbers_of(path_, *inner.at(0), tag);
       if (!values.empty()) return values;
     }
     return {};
@@ -91,6 +96,7 @@ class FrameElements {
   }
 
  private:
+  const fs::path& path_;
   const gdcm::DataSet& set_;
   DicomItems shared_, each_;
 };
@@ -151,6 +157,10 @@ void read_pixel_spacing(const fs::path& path, const FrameElements& elements, std
     refuse_volume(path, "the header says a pixel spacing of ", value,
                   "; it must be above 0. Correct the header or export the series again");
   }
+  if (spacing.size() == 1) {
+    refuse_volume(path, "the header says one pixel spacing, ", spacing[0],
+                  ", where those of rows and of columns are needed; correct it or export the series again");
+  }
   if (spacing.size() >= 2) {
     frame.plane.spacing.x = spacing[1];  // the header states the spacing of rows first
     frame.plane.spacing.y = spacing[0];
@@ -199,8 +209,8 @@ void read_rescaling(const fs::path& path, const FrameElements& elements, std::si
 // frames.
 void place_frames(const fs::path& path, const gdcm::DataSet& set, std::vector<DicomFrame>& frames) {
   const glm::dvec3 normal = frames[0].plane.direction[2];
-  const std::vector<double> offsets = numbers_of(set, Tag(0x3004, 0x000c));
-  const std::vector<double> step = numbers_of(set, kSliceStep);
+  const std::vector<double> offsets = numbers_of(path, set, Tag(0x3004, 0x000c));
+  const std::vector<double> step = numbers_of(path, set, kSliceStep);
   for (std::size_t n = 0; n < frames.size(); ++n) {
     double height = 0.0;
     if (offsets.size() == frames.size()) {
@@ -244,8 +254,14 @@ DicomHeader read_dicom_frames(const fs::path& path, const DicomFile& file) {
     refuse_volume(path, "each voxel holds ", palette ? 3 : format.GetSamplesPerPixel(),
                   " numbers; only slices of single intensities make a volume");
   }
+  if (text_of(set, Tag(0x0008, 0x0008)).find("MOSAIC") != std::string::npos) {
+    refuse_volume(
+        path,
+        "the picture is a mosaic, in which the slices of a volume lie side by side; convert the series "
+        "to NIfTI (as dcm2niix does) or export it as slices");
+  }
   const std::size_t frames = image.GetNumberOfDimensions() == 3 ? image.GetDimension(2) : 1;
-  const FrameElements elements(set);
+  const FrameElements elements(path, set);
   if (frames != file.frames || (elements.frames() > 0 && elements.frames() != frames)) {
     refuse_volume(path, "the file says it has ", file.frames, " frames, but describes ",
                   elements.frames() > 0 ? elements.frames() : frames, "; ", kDamaged);

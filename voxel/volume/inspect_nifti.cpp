@@ -118,7 +118,8 @@ Component nifti_component(const fs::path& path, const NiftiHeader& header) {
                 ", where one whole or real number is needed; save one channel of it");
 }
 
-// Reads the number of voxels and the voxel size along the first three axes.
+// Reads the number of voxels and the voxel size along the first three axes. A last axis with one voxel and
+// without a size, as slices have, is no axis.
 void read_nifti_axes(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
   const int axes = header.at<std::int16_t>(40);
   check_axes(path, axes);
@@ -134,8 +135,12 @@ void read_nifti_axes(const fs::path& path, const NiftiHeader& header, VoxelPlace
       refuse_volume(path, "the file has ", axes, " axes, the ", axis, "th with ", voxels,
                     " entries; save one three-dimensional volume of it");
     }
-    place.frame.dims[n - 1] = voxels;
     const double spacing = header.real(76, n);
+    if (axis > 1 && axis == std::min(axes, 3) && voxels == 1 && spacing == 0.0) {
+      place.axes = n - 1;
+      continue;
+    }
+    place.frame.dims[n - 1] = voxels;
     if (spacing > 0.0) {
       place.frame.spacing[axis - 1] = spacing;
       continue;

@@ -295,6 +295,7 @@ void read_oriented_frame(const fs::path& path, const TextHeader& header, const s
 void read_plain_frame(const fs::path& path, const TextHeader& header, const std::vector<std::size_t>& places,
                       VoxelPlace& place) {
   const std::vector<std::string> spacings = words_between_blanks(header.text("spacings")),
+                                 thicknesses = words_between_blanks(header.text("thicknesses")),
                                  minima = words_between_blanks(header.text("axismins")),
                                  centers = words_between_blanks(lower_case(header.has("centers")
                                                                                ? header.text("centers")
@@ -306,6 +307,9 @@ void read_plain_frame(const fs::path& path, const TextHeader& header, const std:
     const std::size_t entry = places[n];
     double spacing = 1.0;
     if (entry < spacings.size()) spacing = number_of(path, "spacings", spacings[entry]);
+    // A single slice has a thickness, and no spacing to others.
+    if (std::isnan(spacing) && place.frame.dims[n] == 1.0 && entry < thicknesses.size())
+      spacing = number_of(path, "thicknesses", thicknesses[entry]);
     if (std::isnan(spacing))
       refuse_volume(path, "the header gives no voxel spacing along an axis (nan); correct it");
     place.frame.spacing[axis] = spacing * factor[axis];

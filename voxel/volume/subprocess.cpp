@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -26,9 +27,13 @@ SharedMemory::~SharedMemory() {
 }
 
 int run_in_subprocess(const std::function<void()>& call, unsigned cpu_seconds) {
+  const pid_t caller = getpid();
   const pid_t child = fork();
   if (child < 0) return -1;
   if (child == 0) {
+    // The child ends with its caller, also if that is killed.
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != caller) _exit(0);
     std::signal(SIGABRT, SIG_DFL);
     const rlimit cpu{cpu_seconds, cpu_seconds};
     setrlimit(RLIMIT_CPU, &cpu);

@@ -1,11 +1,15 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# kill.sh PROGRAM SCENES FOLDER KILLS: kills the program at random moments, KILLS times over all commands that write
-# files, in turns by SIGKILL and SIGTERM. Every file must be whole or not be there, those that were there before must be
-# as they were or new, and recordings must replay. SIGTERM leaves no temporary file; SIGKILL may leave one whose name
-# no user takes for the result: .hybrid-NUMBER.part, .compose-PROCESS, FILE.partPROCESS. KILL_SEED sets the moments.
+# kill.sh PROGRAM SCENES FOLDER KILLS [MODE…]: ends every command that writes files at KILLS random moments, in turns by
+# SIGKILL, SIGTERM and SIGINT. MODE: names from `modes` below; default: all. Every file must be whole or not be there,
+# those that were there before must be as they were or new, and recordings must replay. SIGTERM and SIGINT leave no
+# temporary file; SIGKILL may leave one whose name no user takes for the result: .hybrid-NUMBER.part, .compose-PROCESS,
+# FILE.partPROCESS. KILL_SEED sets the moments.
 set -u
 program=$1 scenes=$2 folder=$3 kills=$4
+shift 4
+modes="run pictures realtime video replay check compose labels objects scenes measured models tune apply study
+bench-rigid bench-soft bench-occupancy bench-scenes bench-threads stability extremes validate view"
 RANDOM=${KILL_SEED:-1}
 failures=0 signals=0 reached=0
 rm -rf "$folder"
@@ -55,11 +59,12 @@ whole_json() {
 whole() {
   local file=$1
   case $file in
-    */page/*.csv) [ -z "$(tail -c 1 "$file")" ] ;; # its fields may hold commas
+    */page/*.csv | */study/*.csv) [ -z "$(tail -c 1 "$file")" ] ;; # its fields may hold commas
     *.csv) awk -F, 'NR == 1 { n = NF } NF != n { exit 1 }' "$file" && [ -z "$(tail -c 1 "$file")" ] ;;
     *.svg) [ "$(tail -n 1 "$file")" = "</svg>" ] ;;
     *.html) [ "$(tail -n 1 "$file")" = "</html>" ] ;;
     *.png) [ "$(tail -c 8 "$file" | head -c 4)" = IEND ] ;;
+    *.mkv) [ -s "$file" ] && [ $(($(stat -c %s "$file") % (3 * 1280 * 960))) = 0 ] ;; # whole frames
     *.json) whole_json "$file" ;;
     *.nii.gz) gzip -t "$file" ;; # with its checksum
     *.rec) "$program" replay "$file" > replay.log 2>&1 ;;
@@ -85,108 +90,143 @@ check_files() {
   done < <(find out -type f)
 }
 
-random_below() { awk -v most="$1" -v part="$RANDOM" 'BEGIN { print most * part / 32768 }'; }
-
-# killed NAME SIGNAL DELAY_S COMMAND…
+# killed NAME SIGNAL DELAY_S COMMAND…: SIGINT goes to the command and what it has started, as from a terminal. The shell
+# lets its background commands ignore SIGINT; env takes that back.
 killed() {
   local name=$1 signal=$2 delay_s=$3 process status
   shift 3
-  "$@" > run.log 2>&1 &
+  setsid env --default-signal=INT "$@" > run.log 2>&1 &
   process=$!
   sleep "$delay_s"
-  kill "-$signal" "$process" 2> /dev/null && reached=$((reached + 1))
+  if [ "$signal" = INT ]; then kill -INT -- "-$process"; else kill "-$signal" "$process"; fi 2> /dev/null &&
+    reached=$((reached + 1))
   wait "$process" 2> /dev/null
   status=$?
   signals=$((signals + 1))
   case $signal$status in
-    KILL137 | TERM143 | KILL0 | TERM0) ;;
+    KILL137 | TERM143 | INT130 | KILL0 | TERM0 | INT0) ;;
     *) fail "$name, after $delay_s s: status $status after SIG$signal: $(tail -n 3 run.log)" ;;
   esac
   check_files "$name, SIG$signal after $delay_s s" "$signal"
 }
 
-signal_of() { if (($1 % 2 == 0)); then echo KILL; else echo TERM; fi; }
+kinds=(KILL TERM INT)
 
-# mode NAME KILLS COMMAND…: the first run is not killed, so that the others find its files. Every second moment is in the
-# last third of the time that the first run took, because most files are written there.
-mode() {
-  local name=$1 count=$2 n start took_s delay_s
-  shift 2
-  rm -rf out
-  mkdir out
-  seen=()
+# short_mode COMMAND…: the first run is not killed, so that the others find its files. Every second moment is in the
+# last third of the time that a run takes, because most files are written there. That time follows the machine's load:
+# it shrinks after a signal that came too late, and grows after one that came in time.
+short_mode() {
+  local n start took_s delay_s in_time
   start=$EPOCHREALTIME
-  "$@" > run.log 2>&1 || fail "$name: status $? of the first run: $(tail -n 3 run.log)"
+  "$@" > run.log 2>&1 || fail "$mode: status $? of the first run: $(tail -n 3 run.log)"
   took_s=$(awk -v a="$start" -v b="$EPOCHREALTIME" 'BEGIN { print b - a }')
-  check_files "$name, not killed" TERM
-  [ -n "$(find out -type f)" ] || fail "$name: the first run left nothing: $(cat run.log)"
-  for ((n = 0; n < count; ++n)); do
-    delay_s=$(random_below "$took_s")
-    ((n / 2 % 2 == 0)) || delay_s=$(awk -v a="$took_s" -v b="$delay_s" 'BEGIN { print 0.67 * a + 0.4 * b }')
-    killed "$name" "$(signal_of "$n")" "$delay_s" "$@"
+  check_files "$mode, not killed" TERM
+  [ -n "$(find out -type f)" ] || fail "$mode: the first run left nothing: $(cat run.log)"
+  for ((n = 0; n < kills; ++n)); do
+    delay_s=$(awk -v took="$took_s" -v part="$RANDOM" -v late="$((n / 3 % 2))" \
+      'BEGIN { r = part / 32768; print took * (late ? 0.67 + 0.4 * r : r) }')
+    in_time=$reached
+    killed "$mode" "${kinds[n % 3]}" "$delay_s" "$@"
+    took_s=$(awk -v took="$took_s" -v late="$((reached == in_time))" 'BEGIN { print took * (late ? 0.8 : 1.03) }')
   done
-  echo "$name: $count kills"
 }
 
-# long_mode NAME KILLS LONGEST_S COMMAND…: of a command that takes minutes; no run is whole.
+# long_mode LONGEST_S COMMAND…: of a command that takes long; no run is whole.
 long_mode() {
-  local name=$1 count=$2 longest_s=$3 n
-  shift 3
+  local longest_s=$1 n
+  shift
+  for ((n = 0; n < kills; ++n)); do
+    killed "$mode" "${kinds[n % 3]}" \
+      "$(awk -v most="$longest_s" -v part="$RANDOM" 'BEGIN { print most * part / 32768 }')" "$@"
+  done
+}
+
+# with_scene COMMAND…: the command finds small.toml as out/scene.toml, as it is, whatever a run before has made of it.
+with_scene() { short_mode bash -c 'cp small.toml next.toml; mv next.toml out/scene.toml; exec "$@"' -- "$@"; }
+
+# kept_cache: what tune keeps, in a folder that no signal reaches.
+kept_cache() {
+  [ -d kept ] && return
+  cp small.toml kept.toml
+  "$program" tune kept.toml --quick --cache kept > run.log 2>&1 || fail "tune: $(tail -n 3 run.log)"
+}
+
+in_mode() {
+  case $mode in
+    run) short_mode "$program" run small.toml --samples 0 --trace out/t.csv --record out/r.rec --json out/j.json \
+      --save-surface out/s.stl --save-volume out/v.nii.gz ;;
+    pictures) short_mode "$program" run small.toml --plot out/p.svg --picture out/p.png --report out/page ;;
+    realtime) short_mode "$program" run small.toml --realtime --samples 0 --trace out/t.csv --record out/r.rec \
+      --json out/j.json --black-box out/b.csv ;;
+    video)
+      # A stand-in for ffmpeg stores the frames as they come.
+      mkdir bin
+      printf '#!/bin/sh\nfor last; do :; done\ncat > "$last"\n' > bin/ffmpeg
+      chmod +x bin/ffmpeg
+      PATH=$PWD/bin:$PATH short_mode "$program" run small.toml --samples 0 --video out/v.mkv
+      ;;
+    replay)
+      "$program" run small.toml --samples 0 --record kept.rec > run.log 2>&1 || fail "run: $(tail -n 3 run.log)"
+      short_mode "$program" replay kept.rec --json out/j.json
+      ;;
+    check) short_mode "$program" check small.toml labels.nrrd --json out/j.json ;;
+    compose) short_mode "$program" compose --out out/starter --force --json out/j.json ;;
+    labels) short_mode "$program" compose --labels labels.nrrd --names labels.csv --out out/body --force \
+      --json out/j.json ;;
+    objects) short_mode "$program" compare small.toml --plot out/c.svg --json out/c.json --report out/page ;;
+    scenes) short_mode "$program" compare small.toml small.toml --plot out/c.svg --json out/c.json --report out/page ;;
+    measured)
+      "$program" run small.toml --samples 0 --trace kept.csv > run.log 2>&1 || fail "run: $(tail -n 3 run.log)"
+      short_mode "$program" compare small.toml --measured kept.csv --plot out/c.svg --json out/c.json --report out/page
+      ;;
+    models) with_scene bash -c 'rm -rf out/cache; exec "$@"' -- "$program" compare out/scene.toml --models \
+      --cache out/cache --write-variants --plot out/m.svg --json out/m.json --report out/page ;;
+    tune)
+      long_mode 5 "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json \
+        --report out/page
+      # What was kept is kept: the same command comes to its end.
+      "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json > run.log 2>&1 ||
+        fail "tune does not go on: $(tail -n 3 run.log)"
+      check_files "tune, not killed" TERM
+      ;;
+    apply)
+      kept_cache
+      with_scene "$program" tune out/scene.toml --quick --cache kept --apply --json out/t.json --report out/page
+      ;;
+    study) with_scene bash -c 'rm -rf out/study; exec "$@"' -- "$program" study labels.nrrd --labels labels.nrrd \
+      --names labels.csv --out out/study --json out/s.json ;;
+    bench-rigid) short_mode "$program" bench rigid --quick --only slide --meshes ico1 --trace out/trace \
+      --json out/b.json ;;
+    bench-soft) short_mode "$program" bench soft --quick --only load,wave --sizes 16 --plot out/b.svg \
+      --json out/b.json ;;
+    bench-occupancy) short_mode "$program" bench occupancy --quick --only lookup --cells 1000 --plot out/b.svg \
+      --json out/b.json ;;
+    bench-scenes) short_mode "$program" bench small.toml --quick --json out/b.json ;;
+    bench-threads) short_mode "$program" bench threads --scenes small.toml --seconds 0.2 --json out/b.json ;;
+    stability) long_mode 5 "$program" stability "$scenes/wall.toml" --quick --plot out/s.svg --json out/s.json \
+      --report out/page ;;
+    extremes) short_mode "$program" stability "$scenes/wall.toml" --extremes --quick --json out/e.json ;;
+    validate) long_mode 5 "$program" validate --quick --json out/v.json --report out/page ;;
+    view)
+      command -v Xvfb > /dev/null || { echo "view: skipped, there is no Xvfb" && return; }
+      exec {said}<> <(:)
+      Xvfb -displayfd "$said" -screen 0 800x600x24 > xvfb.log 2>&1 &
+      local display=$!
+      read -r -t 20 -u "$said" number && export DISPLAY=:$number
+      short_mode "$program" view small.toml --frames 4 --width 320 --height 240 --out out/frames --record out/r.rec
+      kill "$display"
+      ;;
+    *) fail "'$mode' is no mode; known are" $modes ;;
+  esac
+}
+
+for mode in ${*:-$modes}; do
   rm -rf out
   mkdir out
   seen=()
-  for ((n = 0; n < count; ++n)); do
-    killed "$name" "$(signal_of "$n")" "$(random_below "$longest_s")" "$@"
-  done
-  echo "$name: $count kills"
-}
-
-# The short form leaves out modes that take long, and gives their kills to the others.
-short=$((kills < 100 ? 1 : 0))
-# share PERCENT: of the kills. The modes of the short form have 54 percent.
-share() { echo $((short ? (kills * $1 + 27) / 54 : kills * $1 / 100)); }
-
-mode run "$(share 16)" "$program" run small.toml --samples 0 --trace out/t.csv --record out/r.rec --json out/j.json \
-  --save-surface out/s.stl --save-volume out/v.nii.gz
-cp out/r.rec kept.rec
-mode replay "$(share 4)" "$program" replay kept.rec --json out/j.json
-mode compose "$(share 8)" "$program" compose --out out/starter --force --json out/j.json
-mode "compose of labels" "$(share 8)" "$program" compose --labels labels.nrrd --names labels.csv --out out/body --force \
-  --json out/j.json
-mode check "$(share 4)" "$program" check small.toml --json out/j.json
-mode "compare of whole scenes" "$(share 8)" "$program" compare small.toml small.toml --samples 0 --plot out/c.svg \
-  --json out/c.json --report out/page
-mode bench "$(share 6)" "$program" bench occupancy --quick --only lookup --cells 1000 --plot out/b.svg --json out/b.json
-if ((short == 0)); then
-  mode "compare of models" "$(share 7)" "$program" compare small.toml --plot out/c.svg --json out/c.json --report out/page
-  mode "models in the scene" "$(share 8)" bash -c 'cp small.toml next.toml; mv next.toml out/scene.toml; exec "$@"' -- \
-    "$program" compare out/scene.toml --models --cache out/cache --write-variants --plot out/m.svg --json out/m.json \
-    --report out/page
-  mode "pictures and pages" "$(share 9)" "$program" run small.toml --samples 0 --plot out/p.svg --picture out/p.png \
-    --report out/page
-  long_mode "bench of tissue" "$(share 4)" 12 "$program" bench soft --quick --plot out/b.svg --json out/b.json
-  long_mode tune "$(share 7)" 12 "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json
-  # What was kept is kept: the same command comes to its end.
-  "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json > run.log 2>&1 ||
-    fail "tune does not go on: $(tail -n 3 run.log)"
-  check_files "tune, not killed" TERM
-  rm -rf kept
-  mv out/cache kept
-  mode "tune --apply" "$(share 4)" bash -c 'cp small.toml next.toml; mv next.toml out/scene.toml; exec "$@"' -- \
-    "$program" tune out/scene.toml --quick --cache kept --apply --json out/t.json
-  long_mode stability "$(share 3)" 10 "$program" stability "$scenes/wall.toml" --plot out/s.svg --json out/s.json \
-    --report out/page
-  long_mode validate "$(share 2)" 10 "$program" validate --quick --json out/v.json --report out/page
-  if command -v Xvfb > /dev/null; then
-    exec {said}<> <(:)
-    Xvfb -displayfd "$said" -screen 0 800x600x24 > xvfb.log 2>&1 &
-    display=$!
-    read -r -t 20 -u "$said" number && export DISPLAY=:$number
-    mode view "$(share 2)" "$program" view small.toml --frames 4 --out out/frames --record out/r.rec
-    kill "$display"
-  else
-    echo "view: skipped, there is no Xvfb"
-  fi
-fi
+  before=$signals
+  in_mode
+  echo "$mode: $((signals - before)) signals"
+done
 if ((failures > 0)); then exit 1; fi
 echo "$signals signals, $reached while the program ran: every file was whole or not there"

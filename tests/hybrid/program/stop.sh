@@ -59,6 +59,24 @@ for mode in "" --realtime; do
   done
 done
 
+# From a terminal, Ctrl-C also reaches what the program has started. A stand-in for ffmpeg stores the frames as they
+# come, and ends at the signal, as any program does that does not care.
+mkdir bin
+printf '#!/bin/sh\nfor last; do :; done\ncat > "$last"\n' > bin/ffmpeg
+chmod +x bin/ffmpeg
+PATH=$PWD/bin:$PATH setsid env --default-signal=INT "$program" run "$scenes/wall.toml" --seconds 2000 --samples 0 \
+  --video v.mkv > run.log 2>&1 &
+process=$!
+for ((n = 0; n < 600; ++n)); do
+  grep -q "tick [0-9]" run.log && break
+  sleep 0.1
+done
+kill -INT -- "-$process"
+wait "$process"
+status=$?
+[ "$status" = 130 ] || fail "a video, INT: status $status, not 130"
+[ -s v.mkv ] || fail "the video was lost: $(tail -n 3 run.log)"
+
 # A study keeps the rows that are done. It must take far longer than until its first words.
 stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "^slide" \
   "$program" bench rigid --only slide --meshes ico2,ico3,ico5,ico6,ico7 --json j.json

@@ -330,6 +330,15 @@ TEST(Legend, ListsThePairsThatPressOnEachOtherTheLargestForceFirst) {
                                                     hybrid::palette::of_object(s.scene, 0)}));
 }
 
+TEST(Legend, CutsTheLongerNameOfAPair) {
+  Session s = tests::shell_and_ball();
+  s.scene.objects[1].name = "liver_and_spleen_and_11";
+  s.now.presses = {{.soft = 1, .force_N = 0.7}, {.soft = 1, .other = 0, .force_N = 0.2}};
+  const auto rows = hybrid::legend_rows(s.scene, s.now, 20);
+  EXPECT_EQ(rows[3].name, "liver_and_… – its anchors");
+  EXPECT_EQ(rows[4].name, "liver_and_spleen… – shell");
+}
+
 TEST(Legend, CountsPairsThatDoNotFitAndLeavesObjectsTheirRows) {
   Session s = tests::shell_and_ball();
   for (int p = 0; p < 9; ++p) s.now.presses.push_back({.soft = 1, .other = 0, .force_N = 1.0 + p});

@@ -2,6 +2,7 @@
 // DICOM files in all encodings: frames, byte orders, icons, missing preambles and missing places.
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <vector>
@@ -81,6 +82,60 @@ TEST_F(DicomFrames, EachFrameHasItsOwnRescaling) {
   const std::string two = DicomText{}.words(0x28, 0x1053, {2}), none = DicomText{}.words(0x28, 0x1053, {0});
   zero.replace(zero.find(two), two.size(), none);
   EXPECT_SAYS(refusal_of(folder({with_preamble(zero)})), "rescale slope is 0");
+}
+
+// A slope by slice, as PET scanners write it.
+TEST_F(DicomFrames, EachSliceHasItsOwnRescaling) {
+  const DicomText text;
+  const std::array<double, 8> slopes{1.0, 0.5, 0.25, 2.0, 4.0, 0.1, 0.4, 0.5};
+  const auto rescaled = [&](const std::function<std::string(int)>& slope) {
+    return slices([&](int k) {
+      std::string bytes = dicom_slice(
+          text, k, {}, text.element(0x28, 0x1052, "DS", "0") + text.element(0x28, 0x1053, "DS", slope(k)));
+      const std::string numbers =
+          tests::dicom_pixels(text, {}, k, 100.0 / slopes[static_cast<std::size_t>(k)]);
+      return with_preamble(bytes.replace(bytes.size() - numbers.size(), numbers.size(), numbers));
+    });
+  };
+  const auto written = [&](int k, const char* format) {
+    std::array<char, 32> number{};
+    std::snprintf(number.data(), number.size(), format, slopes[static_cast<std::size_t>(k)]);
+    return std::string(number.data());
+  };
+  expect_base(rescaled([&](int k) { return written(k, "%g"); }), "decimals");
+  expect_base(rescaled([&](int k) { return written(k, " %.6E "); }), "powers of ten");
+  EXPECT_SAYS(refusal_of(rescaled([](int) { return "0,5"; })), "element (0028,1053) holds '0,5'");
+  EXPECT_SAYS(refusal_of(rescaled([](int) { return "0"; })), "rescale slope is 0");
+}
+
+TEST_F(DicomFrames, NumbersThatAreNoneAreRefused) {
+  const DicomText text;
+  const auto with = [&](const std::string& right, const std::string& wrong) {
+    return refusal_of(slices([&](int k) {
+      std::string bytes = dicom_slice(text, k);
+      bytes.replace(bytes.find(right), right.size(), wrong);
+      return with_preamble(bytes);
+    }));
+  };
+  const std::string spacing = text.words(0x28, 0x30, {2, 2});
+  EXPECT_SAYS(with(spacing, text.element(0x28, 0x30, "DS", "2,0\\2,0")),
+              "element (0028,0030) holds '2,0\\2,0'");
+  EXPECT_SAYS(with(spacing, text.element(0x28, 0x30, "DS", "2mm\\2mm")), "where numbers are needed");
+  EXPECT_SAYS(with(spacing, text.element(0x28, 0x30, "DS", "2")), "one pixel spacing");
+  EXPECT_SAYS(
+      with(text.words(0x20, 0x37, {1, 0, 0, 0, 1, 0}), text.element(0x20, 0x37, "DS", "1\\0\\0\\0\\1,0\\0")),
+      "element (0020,0037)");
+}
+
+// Siemens writes the slices of a moment side by side into one picture.
+TEST_F(DicomFrames, AMosaicIsNoSlice) {
+  const DicomText text;
+  const std::string type = text.element(8, 8, "CS", "ORIGINAL\\PRIMARY\\M\\ND\\MOSAIC"),
+                    plain = text.element(8, 8, "CS", "ORIGINAL\\PRIMARY\\M\\ND");
+  EXPECT_SAYS(refusal_of(folder({with_preamble(type + dicom_slice(text, 3))})), "mosaic");
+  EXPECT_SAYS(refusal_of(slices([&](int k) { return with_preamble(type + dicom_slice(text, k)); })),
+              "mosaic");
+  expect_base(slices([&](int k) { return with_preamble(plain + dicom_slice(text, k)); }), "no mosaic");
 }
 
 TEST_F(DicomFrames, FramesAreSortedByTheirPlaces) {

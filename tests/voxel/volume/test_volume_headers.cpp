@@ -2,7 +2,10 @@
 // Frames, units and scaling as stated by headers, against a volume whose labels lie in known places.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <sstream>
@@ -326,6 +329,92 @@ TEST_F(VolumeHeaders, ASlopeOfZeroScalesNothing) {
   EXPECT_EQ(s.maximum, 1.0);
   file.slope = std::numeric_limits<float>::infinity();
   EXPECT_SAYS(refusal_of(write("v.nii", file.text(numbers))), "finite");
+}
+
+// ---- One slice
+
+// Slice 3 of the base volume, as each format can write it.
+TEST_F(VolumeHeaders, ASingleSliceIsAsThickAsItSays) {
+  const std::string voxels = tests::base_voxels<std::uint8_t>().substr(3 * 120, 120);
+  const auto thick_m = [&](const fs::path& path) {
+    const voxel::VolumeHeader header = voxel::read_volume_header(path);
+    EXPECT_EQ(header.dims, (std::array{12, 10, 1}));
+    EXPECT_NEAR(header.spacing_m.x, 2e-3, 1e-12);
+    EXPECT_NEAR(header.spacing_m.y, 2e-3, 1e-12);
+    EXPECT_EQ(counts_of(voxel::load_volume(path, {})),
+              (std::map<int, std::size_t>{{0, 82}, {1, 18}, {2, 8}, {3, 12}}));
+    return header.spacing_m.z;
+  };
+  const auto nifti = [&](std::int16_t axes, float thickness, bool sform) {
+    NiftiFile file;
+    file.qform = sform ? 0 : 1;
+    file.sform = sform ? 1 : 0;
+    std::string bytes = file.text(voxels);
+    const std::array<std::int16_t, 4> dims{axes, 12, 10, 1};
+    std::memcpy(&bytes[40], dims.data(), sizeof(dims));
+    std::memcpy(&bytes[88], &thickness, sizeof(thickness));
+    std::memcpy(&bytes[320], &thickness, sizeof(thickness));  // the sform's
+    return write("v.nii", bytes);
+  };
+  for (const bool sform : {true, false}) {
+    EXPECT_NEAR(thick_m(nifti(3, 5.0F, sform)), 5e-3, 1e-9);
+    EXPECT_EQ(notes_of(in_folder("v.nii")), "");
+    for (const std::int16_t axes : {std::int16_t{2}, std::int16_t{3}}) {
+      EXPECT_NEAR(thick_m(nifti(axes, 0.0F, sform)), 1e-3, 1e-9);
+      EXPECT_SAYS(notes_of(in_folder("v.nii")), "fewer than three axes");
+    }
+  }
+  const auto nrrd = [&](const std::string& sizes, const std::string& lines) {
+    std::string text = nrrd_file(lines);
+    text.resize(text.size() - 960);
+    text.replace(text.find("12 10 8"), 7, sizes);
+    if (sizes.size() == 5) text.replace(text.find("dimension: 3"), 12, "dimension: 2");
+    return write("v.nrrd", text + voxels);
+  };
+  EXPECT_NEAR(thick_m(nrrd("12 10 1", "space: RAS\nspace directions: (2,0,0) (0,2,0) (0,0,5)\n")), 5e-3,
+              1e-12);
+  EXPECT_NEAR(thick_m(nrrd("12 10 1", "spacings: 2 2 5\n")), 5e-3, 1e-12);
+  EXPECT_NEAR(thick_m(nrrd("12 10 1", "spacings: 2 2 nan\nthicknesses: nan nan 5\n")), 5e-3, 1e-12);
+  EXPECT_NEAR(thick_m(nrrd("12 10", "spacings: 2 2\n")), 1e-3, 1e-12);
+  EXPECT_SAYS(notes_of(in_folder("v.nrrd")), "fewer than three axes");
+  EXPECT_SAYS(refusal_of(nrrd("12 10 1", "spacings: 2 2 nan\n")), "no voxel spacing");
+  const auto meta = [&](const std::string& dims, const std::string& lines) {
+    std::string text = meta_file(lines);
+    text.resize(text.size() - 960);
+    text.replace(text.find("12 10 8"), 7, dims);
+    return write("v.mha", text + voxels);
+  };
+  EXPECT_NEAR(thick_m(meta("12 10 1", "ElementSpacing = 2 2 5\n")), 5e-3, 1e-12);
+  EXPECT_NEAR(thick_m(meta("12 10 1", "ElementSize = 2 2 5\n")), 5e-3, 1e-12);
+}
+
+// ---- Byte orders
+
+TEST_F(VolumeHeaders, NumbersOfTheOtherByteOrderLieInTheSamePlaces) {
+  const auto turned = [](auto zero) {
+    std::string bytes = tests::base_voxels<decltype(zero)>();
+    for (std::size_t n = 0; n < bytes.size(); n += sizeof(zero))
+      std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(n),
+                   bytes.begin() + static_cast<std::ptrdiff_t>(n + sizeof(zero)));
+    return bytes;
+  };
+  const std::string frame = vectors(glm::dvec3(2.0), glm::dvec3(-10, -20, 30), "RAS");
+  const auto check = [&](auto zero, const std::string& nrrd_type, const std::string& meta_type) {
+    std::string nrrd = nrrd_file("endian: big\n" + frame);
+    nrrd.resize(nrrd.size() - 960);
+    nrrd.replace(nrrd.find("uint8"), 5, nrrd_type);
+    expect_base(write("v.nrrd", nrrd + turned(zero)), nrrd_type);
+    std::string meta = meta_file("ElementSpacing = 2 2 2\n");
+    meta.resize(meta.size() - 960);
+    meta.replace(meta.find("MET_UCHAR"), 9, meta_type);
+    meta.replace(meta.find("MSB = False"), 11, "MSB = True");
+    expect_base(write("v.mha", meta + turned(zero)), meta_type);
+  };
+  check(std::int16_t{}, "short", "MET_SHORT");
+  check(std::uint16_t{}, "unsigned short", "MET_USHORT");
+  check(std::int32_t{}, "int32", "MET_INT");
+  check(float{}, "float", "MET_FLOAT");
+  check(double{}, "double", "MET_DOUBLE");
 }
 
 // ---- Other files in the place of a volume
