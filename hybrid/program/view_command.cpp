@@ -10,8 +10,10 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/thread_time.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/model_difference.h"
 #include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
+#include "hybrid/program/view_watches.h"
 #include "hybrid/program/viewed_scene.h"
 #include "hybrid/session/live_session.h"
 #include "hybrid/session/real_device.h"
@@ -97,46 +99,10 @@ void ask_video(const ViewCommand& command) {
   require_ffmpeg();
 }
 
-// The past states that the window shows, and from which the session goes on.
-class PastView {
- public:
-  // Fills the notes with the kept states. `now_s`: time of the session.
-  static void add_notes(const Player& player, double now_s, SessionNotes& notes) {
-    for (const KeptState& kept : player.kept()) {
-      notes.kept_s.push_back(now_s - player.time_of(kept));
-      notes.kept_bytes += kept.bytes;
-    }
-  }
-  // The kept state that is shown; empty: the present.
-  static std::optional<std::size_t> shown(const Player& player, double now_s, double back_s) {
-    if (!(back_s > 0.0) || player.kept().empty()) return {};
-    std::size_t nearest = 0;
-    const auto apart = [&](std::size_t n) {
-      return std::abs(now_s - back_s - player.time_of(player.kept()[n]));
-    };
-    for (std::size_t n = 1; n < player.kept().size(); ++n) {
-      if (apart(n) < apart(nearest)) nearest = n;
-    }
-    return nearest;
-  }
-  // The picture of that state. It is filled again only if the state or the points are other ones.
-  const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked) {
-    const KeptState& kept = player.kept()[n];
-    const std::uint64_t number = asked != nullptr ? asked->number : 0;
-    if (state_ != kept.state.get() || snapshot_.asked.number != number) {
-      player.snapshot_of(kept, snapshot_, asked);
-      snapshot_.presses = player.presses_of(*kept.state);
-      state_ = kept.state.get();
-    }
-    return snapshot_;
-  }
-  // Call when the kept states are other ones.
-  void forget() { state_ = nullptr; }
-
- private:
-  const WorldState* state_ = nullptr;  // of snapshot_
-  Snapshot snapshot_;
-};
+void say_error(ModelDifference& difference, ViewFiles& files) {
+  if (const std::string error = difference.take_error(); !error.empty())
+    files.say("The models are not compared: " + error);
+}
 
 void leave_the_past(Window& window) {
   window.act({.verb = ViewVerb::look_back, .numbers = {0.0}});
@@ -153,6 +119,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
   ViewFiles files(command);
   SceneChanger changer(command);
   ChangeComparison comparison;
+  ModelDifference difference(command, false);
   std::optional<ChangeEffect> effect;
   PastView past;
   RestWish rest;
@@ -173,6 +140,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
         request.asked = nullptr;  // the points belong to the scene before
         effect = show_changed(window, viewed, std::move(next), std::move(made), comparison);
         effect->forces = comparison.wait();  // so that frames are reproducible
+        difference.forget();
       }
     } catch (const std::exception& e) {
       files.say(std::string("The scene is as it was: ") + e.what());
@@ -197,10 +165,16 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     player.keep_state();
     player.snapshot(snapshot, request.asked.get());
     snapshot.presses = input.wants_presses && !shows_past ? player.presses() : std::vector<PairPress>();
+    if (input.comparison) {
+      difference.ask(*input.comparison, *viewed, snapshot);
+      difference.wait();  // so that frames are reproducible
+      say_error(difference, files);
+    }
+    snapshot.difference = difference.found();
     SessionNotes notes = notes_of(player, snapshot.t_s, files.message(), effect);
     PastView::add_notes(player, snapshot.t_s, notes);
-    const Snapshot& seen =
-        shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(snapshot);
+    const Snapshot& seen = shows_past ? past.snapshot(player, *back, request.asked.get(), snapshot.difference)
+                                      : std::as_const(snapshot);
     session_s += thread_time_s() - session_began_s;
     window.add_ticks(player.samples(), player.at_rest());
     if (!window.frame(seen, notes)) break;
@@ -221,36 +195,6 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
   return files.save_at_end(*viewed) ? 0 : 1;
 }
 
-// Keeps the forces between objects for the window's list. To compute them the session is held for a moment:
-// a simulated hand does not notice, because held time does not count. A real hand would, so with a real
-// device they are computed only while the session is paused.
-class PressWatch {
- public:
-  const std::vector<PairPress>& presses(const WindowInput& input, const PlayRequest& request,
-                                        const Player& player, LiveSession& session, std::uint64_t tick) {
-    const auto now = std::chrono::steady_clock::now();
-    if (!input.wants_presses || (player.is_real() && !request.paused)) {
-      presses_.clear();
-      tick_ = kNever;
-    } else if (tick != tick_ && now >= next_ && session.hold(request)) {
-      presses_ = player.presses();
-      session.ask(request);
-      tick_ = tick;
-      const auto end = std::chrono::steady_clock::now();
-      next_ = end + std::max<std::chrono::steady_clock::duration>(kEvery, kRest * (end - now));
-    }
-    return presses_;
-  }
-
- private:
-  static constexpr std::uint64_t kNever = ~std::uint64_t{0};
-  static constexpr std::chrono::milliseconds kEvery{200};  // least time between two updates of the list
-  static constexpr int kRest = 19;  // the session is held for at most one part in 20 of the time
-  std::vector<PairPress> presses_;
-  std::uint64_t tick_ = kNever;  // of presses_
-  std::chrono::steady_clock::time_point next_{};
-};
-
 // The window of a session, with the user's files, script and reloads of the scene.
 struct LiveWindow {
   const ViewCommand& command;
@@ -259,6 +203,7 @@ struct LiveWindow {
   ViewScript script;
   SceneReload reload;
   SceneChanger changer;
+  ModelDifference difference;
   ChangeComparison comparison{};
   FrameMeter meter{};
   std::string lost{};  // why the window cannot be shown any more; empty: it can
@@ -269,6 +214,7 @@ struct LiveWindow {
 SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
   SessionNotes notes = notes_of(player, t_s, live.files.message(), live.effect);
   notes.building = live.changer.building();
+  notes.comparing = live.difference.in_words();
   if (!notes.building.empty()) notes.message = notes.building + "; the session goes on meanwhile";
   if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
   PastView::add_notes(player, t_s, notes);
@@ -341,6 +287,7 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
       if (!player.is_real()) live.changer.ask(change);
     }
     if (take_changed_scene(live, viewed, session, request)) {
+      live.difference.forget();
       request.asked = nullptr;
       watch = {};
     }
@@ -359,11 +306,15 @@ device::ServoReport play_live(LiveWindow& live, std::unique_ptr<ViewedScene>& vi
     if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
     session.shown(viewed->drawn, shown);
     shown.presses = watch.presses(input, request, player, session, shown.tick);
+    if (input.comparison) live.difference.ask(*input.comparison, *viewed, shown);
+    shown.difference = live.difference.found();
+    say_error(live.difference, live.files);
     live.window.add_ticks(player.samples(), player.at_rest());
     try {
-      open = live.window.frame(
-          shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),
-          notes_of(live, player, shown.t_s));
+      open =
+          live.window.frame(shows_past ? past.snapshot(player, *back, request.asked.get(), shown.difference)
+                                       : std::as_const(shown),
+                            notes_of(live, player, shown.t_s));
     } catch (const std::exception& e) {
       live.lost = e.what();
       break;
@@ -387,6 +338,7 @@ device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> v
       return report;
     }
     live.changer.cancel();
+    live.difference.forget();
     live.effect.reset();
     live.window.show_scene(next->drawn);
     viewed = std::move(next);
@@ -436,7 +388,8 @@ int view(const ViewCommand& command) {
                   ViewFiles(command),
                   std::move(script),
                   SceneReload(command, viewed->text),
-                  SceneChanger(command)};
+                  SceneChanger(command),
+                  ModelDifference(command, true)};
   const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
   fmt::print("{}\n", live.meter.in_words());
   if (!live.lost.empty()) fmt::print(stderr, "the session ended: {}\n", live.lost);

@@ -32,4 +32,24 @@ std::string words_of_value(EditedQuantity quantity) {
   return {};
 }
 
+std::vector<ModelOption> model_options(const DrawnObject& tissue) {
+  using Key = SceneChange::Key;
+  const ObjectChoices& choices = tissue.choices;
+  const auto energy_words = [](bool trilinear) { return std::string(trilinear ? "trilinear" : "six-link"); };
+  std::vector<ModelOption> options{
+      {"as it is: " + (choices.as_rigid ? std::string("rigid")
+                                        : energy_words(choices.trilinear) + ", " + choices.spacing_words)}};
+  const auto add = [&](const std::string& words, Key key, double value) {
+    options.push_back({words, {{key, tissue.name, glm::dvec3(value, 0.0, 0.0)}}});
+  };
+  if (choices.as_rigid) {
+    if (choices.other_model) add("by its voxels", Key::model, 0.0);
+    return options;
+  }
+  if (choices.other_energy) add(energy_words(!choices.trilinear), Key::energy, choices.trilinear ? 0.0 : 1.0);
+  for (const SpacingChoice& other : choices.spacings) add(other.words, Key::spacing, other.spacing_m);
+  if (choices.other_model) add("as rigid", Key::model, 1.0);
+  return options;
+}
+
 }  // namespace hybrid

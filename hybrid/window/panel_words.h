@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
 
@@ -13,5 +14,14 @@ namespace hybrid {
 // The format of a slider's number: three digits at least, and never an exponent for a large number.
 [[nodiscard]] std::string number_format(float shown);
 [[nodiscard]] std::string words_of_value(EditedQuantity quantity);
+
+// A model of tissue that may be compared with another one: the scene after these changes.
+struct ModelOption {
+  std::string words{};
+  std::vector<SceneChange> changes{};
+};
+// The tissue as it is comes first. Then those that differ in one thing: energy, spacing (finer ones first),
+// or rigid.
+[[nodiscard]] std::vector<ModelOption> model_options(const DrawnObject& tissue);
 
 }  // namespace hybrid

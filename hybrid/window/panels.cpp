@@ -417,6 +417,8 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
       draw_effect(pen, frame);
     if (open_section("View")) draw_view(pen, scene, frame, result);
+    if (has_soft(scene) && open_section("Difference of two models", false))
+      draw_difference(pen, scene, snapshot, frame, result);
     Pen chart = pen;
     chart.list = ImGui::GetWindowDrawList();
     if (open_section("Force")) {

@@ -105,6 +105,10 @@ void act_on_session(ViewState& state, const ViewAction& action) {
     case ViewVerb::change:
       state.changes.push_back(action.change);
       break;
+    case ViewVerb::difference:
+      state.comparison = action.comparison;
+      if (!action.comparison.object.empty()) state.view.colour = TissueColour::difference;
+      break;
     case ViewVerb::screenshot:
       state.screenshot = action.text;
       break;

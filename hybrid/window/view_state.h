@@ -21,6 +21,7 @@ enum class ViewVerb : std::uint8_t {
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
   change,          // change: of the scene, which is built again
+  difference,      // comparison: of two models over a surface, which it begins; without an object: ends it
   look_back,       // numbers: seconds before now; 0: the present
   go_on,           // the session goes on from the past that is shown
   arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
@@ -56,6 +57,7 @@ struct ViewAction {
   std::uint32_t object = Edit::kTool;
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
   SceneChange change{};
+  ModelComparison comparison{};
 };
 
 struct ViewState {
@@ -71,6 +73,7 @@ struct ViewState {
   bool go_on = false;
   std::vector<Edit> edits{};
   std::vector<SceneChange> changes{};
+  std::optional<ModelComparison> comparison{};                     // to begin; without an object: to end
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look
