@@ -44,8 +44,8 @@ std::optional<float> mark_of(const ColourScale& scale) {
 }
 
 // Tissue that hardly moved keeps its own colour. The scale shows white in its place.
-Ink ink_at(float share) {
-  return ink_of(palette::of_displacement(glm::vec3(1.0F), share));
+Ink ink_at(const ColourScale& scale, float share) {
+  return ink_of(palette::of_displacement(glm::vec3(1.0F), share, scale.start()));
 }
 
 bool contains(const PixelRect& rect, const glm::vec2& at) {
@@ -100,7 +100,8 @@ float draw_upright(const Pen& pen, float x0, float y0, float width, const Colour
   const float top = y + 0.5F * em, bottom = top + kRampHeight * em, right = x0 + 1.4F * em;
   for (int s = 0; s < kSteps; ++s) {
     const float a = static_cast<float>(s) / kSteps, b = static_cast<float>(s + 1) / kSteps;
-    pen.fill({x0, bottom - b * (bottom - top)}, {right, bottom - a * (bottom - top)}, ink_at(0.5F * (a + b)));
+    pen.fill({x0, bottom - b * (bottom - top)}, {right, bottom - a * (bottom - top)},
+             ink_at(scale, 0.5F * (a + b)));
   }
   pen.frame({x0, top}, {right, bottom}, pen.inks.edge);
   if (const auto mark = mark_of(scale)) {
@@ -127,7 +128,8 @@ void draw_colour_scale(const Pen& pen, const PixelRect& where, const ColourScale
   const float top = y0 + 2.0F * em, bottom = top + 0.9F * em;
   for (int s = 0; s < kSteps; ++s) {
     const float a = static_cast<float>(s) / kSteps, b = static_cast<float>(s + 1) / kSteps;
-    pen.fill({left + a * (right - left), top}, {left + b * (right - left), bottom}, ink_at(0.5F * (a + b)));
+    pen.fill({left + a * (right - left), top}, {left + b * (right - left), bottom},
+             ink_at(scale, 0.5F * (a + b)));
   }
   pen.frame({left, top}, {right, bottom}, pen.inks.edge);
   if (const auto mark = mark_of(scale)) {

@@ -214,7 +214,7 @@ void TissueView::note_moved(float moved_m) {
     most_moved_m_ = palette::scale_end(size);
 }
 
-// Where nothing is known tissue has its own colour, as where nothing is felt.
+// Where nothing is known tissue has its own colour. Elsewhere a value is at least where the ramp begins.
 void TissueView::take_difference(const FeltDifference* difference) {
   const std::uint64_t number = difference != nullptr ? difference->number : 0;
   if (difference_ == number && differs_) return;
@@ -230,6 +230,10 @@ void TissueView::take_difference(const FeltDifference* difference) {
     for (std::size_t v = 0; v < values.size(); ++v)
       values[v] = std::isnan(difference->jnd[v]) ? 0.0F : difference->jnd[v];
     raise_end(most_jnd_, kLeast_jnd, kNo_jnd, values);
+    const float least = palette::kRampAtOnce.ramp_from * static_cast<float>(std::max(most_jnd_, kLeast_jnd));
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      if (!std::isnan(difference->jnd[v])) values[v] = std::max(values[v], least);
+    }
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
+#include "hybrid/view/palette.h"
 #include "hybrid/view/tissue/scan_values.h"
 #include "hybrid/view/tissue/section.h"
 #include "hybrid/view/view_settings.h"
@@ -19,6 +20,9 @@ struct ColourScale {
   TissueColour colour = TissueColour::displacement;
   double end = 0.0;  // m; for strain and limits a share; for a difference JND
 
+  [[nodiscard]] palette::RampStart start() const {
+    return colour == TissueColour::difference ? palette::kRampAtOnce : palette::kOwnFirst;
+  }
   friend bool operator==(const ColourScale&, const ColourScale&) = default;
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hybrid/window/panel_words.h"
 
+#include "hybrid/base/number_text.h"
+
 namespace hybrid {
 
 std::string object_name(const DrawnScene& scene, std::uint32_t object) {
@@ -10,6 +12,10 @@ std::string object_name(const DrawnScene& scene, std::uint32_t object) {
 
 std::string number_format(float shown) {
   return shown >= 99.95F ? "%.0f" : shown >= 9.995F ? "%.1f" : shown >= 0.9995F ? "%.2f" : "%.3g";
+}
+
+std::string tick_time_text(double us) {
+  return us < 1000.0 ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
 }
 
 std::string words_of_value(EditedQuantity quantity) {

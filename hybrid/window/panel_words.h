@@ -13,6 +13,8 @@ namespace hybrid {
 [[nodiscard]] std::string object_name(const DrawnScene& scene, std::uint32_t object);
 // The format of a slider's number: three digits at least, and never an exponent for a large number.
 [[nodiscard]] std::string number_format(float shown);
+// For example "85.2 µs" or "1.23 ms".
+[[nodiscard]] std::string tick_time_text(double us);
 [[nodiscard]] std::string words_of_value(EditedQuantity quantity);
 
 // A model of tissue that may be compared with another one: the scene after these changes.

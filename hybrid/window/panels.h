@@ -63,7 +63,8 @@ class Panels final : public OverlayPanel {
             const PixelRect& where) override;
 
  private:
-  void draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const;
+  void draw_session(const PanelFrame& frame, const Snapshot& snapshot, const TickTimes& times,
+                    PanelResult& result) const;
   void draw_objects(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                     const PanelFrame& frame, PanelResult& result) const;
   void draw_presses(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
@@ -76,6 +77,10 @@ class Panels final : public OverlayPanel {
   void draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
   void draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result);
   void draw_effect(const Pen& pen, const PanelFrame& frame) const;
+  // ---- panel_force.cpp ----
+  void draw_force(const Pen& chart, const DrawnScene& scene, const PanelFrame& frame,
+                  PanelResult& result) const;
+  void draw_watch(const Pen& pen, const PanelFrame& frame, PanelResult& result) const;
   // ---- panel_difference.cpp ----
   void draw_difference(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                        const PanelFrame& frame, PanelResult& result);
@@ -119,6 +124,9 @@ void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera&
 // Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in
 // it.
 void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history);
+// The same as areas: what each part adds lies above the line of zero, what it takes away below. A line is the
+// force on the hand.
+void draw_force_parts(const Pen& pen, const PixelRect& where, const TickHistory& history);
 // Draws tick times on a logarithmic axis, with a line at the servo period.
 void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& times);
 // Draws the mean time of each stage as a bar.

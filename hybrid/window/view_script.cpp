@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "hybrid/window/watched_numbers.h"
 #include "hybrid/window/window.h"
 #include "hybrid/window/window_keys.h"
 
@@ -36,6 +37,7 @@ enum class ScriptArguments : std::uint8_t {
   slice,          // "off", or an axis, and a number or "off"
   colour,         // one of kTissueColours
   file,           // a file name; may be left out
+  watched,        // the name of a number of the tick
   key,
   point,  // two numbers
   drag,   // four numbers, and a button, which may be left out
@@ -46,10 +48,12 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 35> kScriptCommands{
+constexpr std::array<ScriptCommand, 37> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
      {"rest", ViewVerb::rest, ScriptArguments::on_or_off, "rest on"},
+     {"stack", ViewVerb::stack, ScriptArguments::on_or_off, "stack on"},
+     {"watch", ViewVerb::watch, ScriptArguments::watched, "watch \"device x\""},
      {"speed", ViewVerb::speed, ScriptArguments::number, "speed 0.1"},
      {"restart", ViewVerb::restart, ScriptArguments::none, "restart"},
      {"edit", ViewVerb::edit, ScriptArguments::edit, "edit tool stiffness 600"},
@@ -130,6 +134,11 @@ class ScriptLine {
            "; write a time and one of these: " + names);
   }
 
+  [[noreturn]] void refuse_number() const {
+    std::string names;
+    for (const WatchedNumber& number : watched_numbers()) names += (names.empty() ? "" : ", ") + number.name;
+    refuse("a tick has no number '" + words_[2] + "'; it has " + names);
+  }
   [[nodiscard]] double number(std::size_t n, double low, double high) const {
     return number_in(n < words_.size() ? words_[n] : std::string(), low, high);
   }
@@ -358,6 +367,11 @@ class ScriptLine {
       case ScriptArguments::file:
         expect(0, 1);
         if (words_.size() > 2) action.text = words_[2];
+        break;
+      case ScriptArguments::watched:
+        expect(1, 1);
+        if (watched_number_named(words_[2]) == nullptr) refuse_number();
+        action.text = words_[2];
         break;
       case ScriptArguments::key:
         expect(1, 1);

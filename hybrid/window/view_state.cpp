@@ -154,6 +154,12 @@ void act(ViewState& state, const ViewAction& action) {
     case ViewVerb::arrows:
       set_or_flip(state.moves, action);
       return;
+    case ViewVerb::stack:
+      set_or_flip(state.stacked, action);
+      return;
+    case ViewVerb::watch:
+      if (std::erase(state.watched, action.text) == 0) state.watched.push_back(action.text);
+      return;
     case ViewVerb::panels:
       set_or_flip(state.panels, action);
       return;

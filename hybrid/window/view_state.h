@@ -17,6 +17,8 @@ enum class ViewVerb : std::uint8_t {
   pause,           // numbers: 1 on, 0 off, none: toggle
   step,            // does one tick while paused
   rest,            // numbers: 1 compares with the force at rest, 0 ends it, none: toggle
+  stack,           // numbers: 1 the parts of the force as areas, 0 as lines, none: toggle
+  watch,           // text: name of a number of the tick, which is watched from now on, or no longer
   speed,           // numbers: simulated time over real time
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
@@ -64,7 +66,9 @@ struct ViewState {
   ViewSettings view;
   bool panels = true;
   std::uint32_t selected = Edit::kTool;
-  bool moves = false;  // arrows on the selected object are shown
+  bool moves = false;                  // arrows on the selected object are shown
+  bool stacked = false;                // the chart of the force shows its parts as areas
+  std::vector<std::string> watched{};  // names of numbers (watched_numbers.h)
   // ---- requests to the session; the owner of the session takes counters and lists ----
   bool paused = false, compares_with_rest = false;
   double speed = 1.0;

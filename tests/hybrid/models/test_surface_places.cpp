@@ -43,8 +43,9 @@ TEST(SurfacePlaces, CoverASurfaceEvenlyHoweverManyThereAre) {
   double before_m = std::numeric_limits<double>::infinity();
   while (const auto place = places.next(2e-3)) {
     for (const glm::dvec3& other : given) {
-      if ((other.z == 0.0) == (place->at_m.z == 0.0))
+      if ((other.z == 0.0) == (place->at_m.z == 0.0)) {
         EXPECT_GE(glm::distance(other, place->at_m), 0.999 * std::min(before_m, 1.0)) << given.size();
+      }
     }
     EXPECT_NEAR(place->outward.z, place->at_m.z == 0.0 ? 1.0 : -1.0, 1e-12);
     given.push_back(place->at_m);
@@ -88,8 +89,12 @@ TEST(SurfacePlaces, KeepWhatIsNotKnown) {
     values.push_back(place->at_m.x < 0.01 ? std::numeric_limits<float>::quiet_NaN() : 2.0F);
   const std::vector<float> spread = places.spread(values);
   for (std::size_t v = 0; v + 1 < spread.size(); ++v) {
-    if (mesh.vertices[v].x < 0.008) EXPECT_TRUE(std::isnan(spread[v]));
-    if (mesh.vertices[v].x > 0.012) EXPECT_FLOAT_EQ(spread[v], 2.0F);
+    if (mesh.vertices[v].x < 0.008) {
+      EXPECT_TRUE(std::isnan(spread[v]));
+    }
+    if (mesh.vertices[v].x > 0.012) {
+      EXPECT_FLOAT_EQ(spread[v], 2.0F);
+    }
   }
   EXPECT_TRUE(std::isnan(spread.back()));
   // Few places suffice, and a single one.

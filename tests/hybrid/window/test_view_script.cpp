@@ -245,8 +245,21 @@ TEST(ViewScript, ComparesTwoModels) {
   }
 }
 
+TEST(ViewScript, WatchesNumbersAndStacksTheForce) {
+  ViewScript script("0 watch \"device x\"\n0 watch tick\n0 stack on\n1 watch \"device x\"\n", "tour.txt",
+                    drawn());
+  hybrid::ViewState state;
+  for (const auto& action : script.due(0.0)) hybrid::act(state, action);
+  EXPECT_EQ(state.watched, (std::vector<std::string>{"device x", "tick"}));
+  EXPECT_TRUE(state.stacked);
+  for (const auto& action : script.due(1.0)) hybrid::act(state, action);
+  EXPECT_EQ(state.watched, (std::vector<std::string>{"tick"})) << "no longer";
+  EXPECT_NE(refusal_of_script("0 watch tock").find("it has "), std::string::npos);
+}
+
 TEST(ModelOptions, OfferWhatAnObjectAllows) {
-  hybrid::DrawnObject lung{.name = "lung"};
+  hybrid::DrawnObject lung;
+  lung.name = "lung";
   lung.choices = {.tissue = true,
                   .other_model = true,
                   .other_energy = true,
