@@ -180,8 +180,7 @@ void draw_force_parts(const Pen& pen, const PixelRect& where, const TickHistory&
   const float em = pen.em;
   const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
   const auto x1 = x0 + static_cast<float>(where.width), y1 = y0 + static_cast<float>(where.height);
-  const std::string widest = force_text(axis_end(history.most_N()));
-  const float left = x0 + pen.width("-" + widest) + 0.5F * em, top = y0 + (1.7F + kKeyRow) * em,
+  const float left = x0 + pen.width("-0.888 N") + 0.5F * em, top = y0 + (1.7F + kKeyRow) * em,
               bottom = y1 - 1.5F * em;
   const auto count = static_cast<std::size_t>(std::max(x1 - left, 1.0F));
   const auto columns = history.parts(count);
@@ -220,6 +219,7 @@ void draw_force_parts(const Pen& pen, const PixelRect& where, const TickHistory&
   for (const double at_N : {high_N, 0.0, -low_N}) {
     const std::string words = at_N == 0.0 ? "0" : at_N < 0.0 ? "-" + force_text(-at_N) : force_text(at_N);
     pen.line({left, y_of(at_N)}, {x1, y_of(at_N)}, pen.inks.edge);
+    if (at_N < 0.0 && y_of(at_N) - y_of(0.0) < 1.2F * em) continue;  // it would cover the zero
     pen.text(left - 0.5F * em - pen.width(words), y_of(at_N) - 0.6F * em, pen.inks.pale, words);
   }
   std::vector<ForceSeries> shown{ForceSeries::soft, ForceSeries::rigid};
