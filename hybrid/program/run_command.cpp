@@ -113,8 +113,13 @@ class RunVideo {
 
 }  // namespace
 
+// All but the difference of two models, which a session does not know.
 std::vector<std::string> tissue_colours() {
-  return {kTissueColours.begin(), kTissueColours.end()};
+  std::vector<std::string> names;
+  for (const std::string_view name : kTissueColours) {
+    if (name != kTissueColours[static_cast<std::size_t>(TissueColour::difference)]) names.emplace_back(name);
+  }
+  return names;
 }
 
 Progress progress_on_terminal() {

@@ -48,6 +48,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
   ViewFiles files(command);
   SceneChanger changer(command);
   ChangeComparison comparison;
+  ModelDifference difference(command, false);
   std::optional<ChangeEffect> effect;
   PastView past;
   RestWish rest;
@@ -68,6 +69,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
         request.asked = nullptr;  // the points belong to the scene before
         effect = show_changed(window, viewed, std::move(next), std::move(made), comparison);
         effect->forces = comparison.wait();  // so that frames are reproducible
+        difference.forget();
       }
     } catch (const std::exception& e) {
       files.say(std::string("The scene is as it was: ") + e.what());
@@ -92,10 +94,16 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     player.keep_state();
     player.snapshot(snapshot, request.asked.get());
     snapshot.presses = input.wants_presses && !shows_past ? player.presses() : std::vector<PairPress>();
+    if (input.comparison) {
+      difference.ask(*input.comparison, *viewed, snapshot);
+      difference.wait();  // so that frames are reproducible
+      say_error(difference, files);
+    }
+    snapshot.difference = difference.found();
     SessionNotes notes = notes_of(player, snapshot.t_s, files.message(), effect);
     PastView::add_notes(player, snapshot.t_s, notes);
-    const Snapshot& seen =
-        shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(snapshot);
+    const Snapshot& seen = shows_past ? past.snapshot(player, *back, request.asked.get(), snapshot.difference)
+                                      : std::as_const(snapshot);
     session_s += thread_time_s() - session_began_s;
     window.add_ticks(player.samples(), player.at_rest());
     if (!window.frame(seen, notes)) break;

@@ -55,6 +55,7 @@ struct LiveWindow {
   ViewScript script;
   SceneReload reload;
   SceneChanger changer;
+  ModelDifference difference;
   ChangeComparison comparison{};
   FrameMeter meter{};
   std::string lost{};  // why the window cannot be shown any more; empty: it can
@@ -65,6 +66,7 @@ struct LiveWindow {
 SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
   SessionNotes notes = notes_of(player, t_s, live.files.message(), live.effect);
   notes.building = live.changer.building();
+  notes.comparing = live.difference.in_words();
   if (!notes.building.empty()) notes.message = notes.building + "; the session goes on meanwhile";
   if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
   PastView::add_notes(player, t_s, notes);
@@ -137,6 +139,7 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
       if (!player.is_real()) live.changer.ask(change);
     }
     if (take_changed_scene(live, viewed, session, request)) {
+      live.difference.forget();
       request.asked = nullptr;
       watch = {};
     }
@@ -155,11 +158,15 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
     if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
     session.shown(viewed->drawn, shown);
     shown.presses = watch.presses(input, request, player, session, shown.tick);
+    if (input.comparison) live.difference.ask(*input.comparison, *viewed, shown);
+    shown.difference = live.difference.found();
+    say_error(live.difference, live.files);
     live.window.add_ticks(player.samples(), player.at_rest());
     try {
-      open = live.window.frame(
-          shows_past ? past.snapshot(player, *back, request.asked.get()) : std::as_const(shown),
-          notes_of(live, player, shown.t_s));
+      open =
+          live.window.frame(shows_past ? past.snapshot(player, *back, request.asked.get(), shown.difference)
+                                       : std::as_const(shown),
+                            notes_of(live, player, shown.t_s));
     } catch (const std::exception& e) {
       live.lost = e.what();
       break;
@@ -183,6 +190,7 @@ device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> v
       return report;
     }
     live.changer.cancel();
+    live.difference.forget();
     live.effect.reset();
     live.window.show_scene(next->drawn);
     viewed = std::move(next);
@@ -201,7 +209,8 @@ int play_live(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, W
                   ViewFiles(command),
                   std::move(script),
                   SceneReload(command, viewed->text),
-                  SceneChanger(command)};
+                  SceneChanger(command),
+                  ModelDifference(command, true)};
   const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
   fmt::print("{}\n", live.meter.in_words());
   if (!live.lost.empty()) fmt::print(stderr, "the session ended: {}\n", live.lost);

@@ -48,6 +48,11 @@ ChangeEffect show_changed(Window& window, std::unique_ptr<ViewedScene>& viewed,
   return std::move(made.effect);
 }
 
+void say_error(ModelDifference& difference, ViewFiles& files) {
+  if (const std::string error = difference.take_error(); !error.empty())
+    files.say("The models are not compared: " + error);
+}
+
 void PastView::add_notes(const Player& player, double now_s, SessionNotes& notes) {
   for (const KeptState& kept : player.kept()) {
     notes.kept_s.push_back(now_s - player.time_of(kept));
@@ -67,7 +72,8 @@ std::optional<std::size_t> PastView::shown(const Player& player, double now_s, d
   return nearest;
 }
 
-const Snapshot& PastView::snapshot(const Player& player, std::size_t n, const AskedPoints* asked) {
+const Snapshot& PastView::snapshot(const Player& player, std::size_t n, const AskedPoints* asked,
+                                   const std::shared_ptr<const FeltDifference>& difference) {
   const KeptState& kept = player.kept()[n];
   const std::uint64_t number = asked != nullptr ? asked->number : 0;
   if (state_ != kept.state.get() || snapshot_.asked.number != number) {
@@ -75,6 +81,7 @@ const Snapshot& PastView::snapshot(const Player& player, std::size_t n, const As
     snapshot_.presses = player.presses_of(*kept.state);
     state_ = kept.state.get();
   }
+  snapshot_.difference = difference;
   return snapshot_;
 }
 

@@ -8,6 +8,8 @@
 #include <string>
 
 #include "hybrid/program/commands.h"
+#include "hybrid/program/model_difference.h"
+#include "hybrid/program/view_files.h"
 #include "hybrid/program/viewed_scene.h"
 #include "hybrid/window/view_script.h"
 #include "hybrid/window/window.h"
@@ -33,6 +35,9 @@ namespace hybrid {
                                         std::unique_ptr<ViewedScene> next, ChangeMade made,
                                         ChangeComparison& comparison);
 
+// Says in the window why two models could not be compared.
+void say_error(ModelDifference& difference, ViewFiles& files);
+
 // The past states that the window shows, and from which the session goes on.
 class PastView {
  public:
@@ -41,7 +46,8 @@ class PastView {
   // The kept state that is shown; empty: the present.
   [[nodiscard]] static std::optional<std::size_t> shown(const Player& player, double now_s, double back_s);
   // The picture of that state. It is filled again only if the state or the points are other ones.
-  const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked);
+  const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked,
+                           const std::shared_ptr<const FeltDifference>& difference);
   // Call when the kept states are other ones.
   void forget() { state_ = nullptr; }
   // The window shows the present again.

@@ -23,8 +23,29 @@ namespace {
 
 constexpr double kHandSpeed_m_per_s = 0.5;  // speed of a brisk hand; a mouse could be faster
 
+// The parts of a force along the direction that it has before its limits; none without a force.
+std::array<float, kForceParts> parts_along(const TickResult& felt) noexcept {
+  const glm::dvec3 whole_N = felt.rigid_N + felt.soft_N;
+  const double length_N = glm::length(whole_N);
+  std::array<float, kForceParts> along_N{};
+  if (!(length_N > 0.0)) return along_N;
+  const auto part = [&](ForcePart of, const glm::dvec3& force_N) {
+    along_N[static_cast<std::size_t>(of)] = static_cast<float>(glm::dot(force_N, whole_N) / length_N);
+  };
+  part(ForcePart::rigid, felt.rigid_N - felt.friction_N - felt.damping_N);
+  part(ForcePart::soft, felt.soft_N);
+  part(ForcePart::friction, felt.friction_N);
+  part(ForcePart::damping, felt.damping_N);
+  part(ForcePart::limits, felt.limits_N);
+  part(ForcePart::passivity, felt.passivity_N);
+  return along_N;
+}
+
 TickSample sample_of(const TickResult& felt, double t_s, double late_s, double dt_s) noexcept {
   return {.t_s = t_s,
+          .device_m = felt.device_m,
+          .proxy_m = felt.proxy_m,
+          .force_N = glm::vec3(felt.force_N),
           .total_N = static_cast<float>(glm::length(felt.force_N)),
           .rigid_N = static_cast<float>(glm::length(felt.rigid_N)),
           .soft_N = static_cast<float>(glm::length(felt.soft_N)),
@@ -32,6 +53,8 @@ TickSample sample_of(const TickResult& felt, double t_s, double late_s, double d
           .damping_N = static_cast<float>(glm::length(felt.damping_N)),
           .limits_N = static_cast<float>(glm::length(felt.limits_N)),
           .passivity_N = static_cast<float>(glm::length(felt.passivity_N)),
+          .along_N = parts_along(felt),
+          .contacts = felt.contacts,
           .tick_us = static_cast<float>(felt.tick_us),
           .stage_us = felt.stage_us,
           .late = late_s >= dt_s};

@@ -49,6 +49,14 @@ struct ObjectChoices {
   std::string note{};  // why something cannot be changed; may be empty
 };
 
+// Two models of an object that are compared over its surface. Each is the present scene after some changes.
+struct ModelComparison {
+  std::string object{};
+  std::vector<SceneChange> a{}, b{};
+  double depth_m = 0.0;    // by which the tool is pressed in
+  std::size_t places = 0;  // after which the comparison ends; 0: it goes on until the surface is covered
+};
+
 // Forces on the hand at one place before and after a change, with all tissue at rest.
 struct ComparedForces {
   double before_N = 0.0, after_N = 0.0, difference_jnd = 0.0;

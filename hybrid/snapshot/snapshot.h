@@ -146,6 +146,21 @@ struct PairPress {
   std::optional<double> force_N{};  // empty: not known
 };
 
+// The difference that a hand would feel between two models of an object, at each vertex of its surface: the
+// tool is pressed in there by one depth, and stands still until all tissue is at rest.
+struct FeltDifference {
+  std::uint64_t comparison = 0, number = 0;  // comparisons so far; rises with each new result
+  std::size_t object = 0;                    // of DrawnScene::objects
+  std::vector<float> jnd{};                  // [vertex] NaN: not known, because the tool cannot come there
+  std::size_t places = 0, pressed = 0;       // places that were tried; those with both forces
+  double gap_m = 0.0;                        // how far a vertex is at most from a place
+  double share_felt = 0.0;                   // of the known surface: more than 1 JND
+  struct Most {                              // the place with the largest difference
+    glm::dvec3 at_m{0.0};
+    double jnd = 0.0, a_N = 0.0, b_N = 0.0;
+  } most{};
+};
+
 struct Snapshot {
   std::uint32_t scene = 0;  // number of changes of the scene before it; DrawnScene must be of the same scene
   std::uint64_t tick = 0;
@@ -166,6 +181,7 @@ struct Snapshot {
   double tick_us = 0.0;
   std::vector<PairPress> presses{};  // pairs that touch; filled between ticks, if anyone asks for them
   std::vector<double> values{};      // present values of DrawnScene::editable, SI
+  std::shared_ptr<const FeltDifference> difference{};  // null: no models are compared
 
   [[nodiscard]] RigidPlace place_of(std::size_t object) const {
     return object < rigid_place.size() ? rigid_place[object] : RigidPlace{};

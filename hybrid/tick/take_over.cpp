@@ -99,4 +99,14 @@ RestForce force_at_rest(const World& world, const WorldState& state, const std::
   return stand_still(world, *copy, kMostResting, stop);
 }
 
+std::optional<RestForce> press_to_rest(const World& world, const WorldState& fresh,
+                                       const glm::dvec3& device_m, const glm::dvec3& outside_m,
+                                       double most_way_m, const std::atomic<bool>& stop) {
+  const std::unique_ptr<WorldState> copy = copy_state(world, fresh);
+  if (!start_outside(world, *copy, device_m, outside_m, outside_m - device_m) ||
+      glm::distance(copy->proxy_m, outside_m) > most_way_m)
+    return std::nullopt;
+  return stand_still(world, *copy, kMostResting, stop);
+}
+
 }  // namespace hybrid

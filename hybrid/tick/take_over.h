@@ -5,6 +5,7 @@
 #include <atomic>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "hybrid/world/world_state.h"
@@ -32,5 +33,10 @@ struct RestForce {
 // `stop` is true.
 [[nodiscard]] RestForce force_at_rest(const World& world, const WorldState& state,
                                       const std::atomic<bool>& stop);
+// The same under a tool that comes from `outside_m` and stands at `device_m`. `fresh`: a state before its
+// first tick. Empty: no place for the tool is free at `outside_m`, nor up to `most_way_m` away from it.
+[[nodiscard]] std::optional<RestForce> press_to_rest(const World& world, const WorldState& fresh,
+                                                     const glm::dvec3& device_m, const glm::dvec3& outside_m,
+                                                     double most_way_m, const std::atomic<bool>& stop);
 
 }  // namespace hybrid

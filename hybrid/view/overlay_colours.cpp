@@ -20,6 +20,8 @@ std::string title_of(TissueColour colour) {
       return "largest strain";
     case TissueColour::limits:
       return "links, of their limit";
+    case TissueColour::difference:
+      return "felt difference of two models";
     default:
       return "tissue moved by";
   }
@@ -28,14 +30,22 @@ std::string title_of(TissueColour colour) {
 std::string value_text(const ColourScale& scale, double share) {
   if (share == 0.0) return "0";
   if (scale.colour == TissueColour::displacement) return length_text(share * scale.end);
-  // A few places may have a larger strain than the scale's end.
-  const bool more = scale.colour == TissueColour::strain && share == 1.0;
-  return (more ? "≥ " : "") + with_digits(100.0 * share * scale.end, 3) + " %";
+  // A few places may have a larger strain or difference than the scale's end.
+  const bool more = scale.colour != TissueColour::limits && share == 1.0;
+  const bool differs = scale.colour == TissueColour::difference;
+  return (more ? "≥ " : "") + with_digits((differs ? 1.0 : 100.0) * share * scale.end, 3) +
+         (differs ? " JND" : " %");
+}
+
+// Where on a scale of differences a hand begins to tell them, as a share; empty: no mark.
+std::optional<float> mark_of(const ColourScale& scale) {
+  if (scale.colour != TissueColour::difference || !(scale.end > 1.0)) return {};
+  return static_cast<float>(1.0 / scale.end);
 }
 
 // Tissue that hardly moved keeps its own colour. The scale shows white in its place.
-Ink ink_at(float share) {
-  return ink_of(palette::of_displacement(glm::vec3(1.0F), share));
+Ink ink_at(const ColourScale& scale, float share) {
+  return ink_of(palette::of_displacement(glm::vec3(1.0F), share, scale.start()));
 }
 
 bool contains(const PixelRect& rect, const glm::vec2& at) {
@@ -90,9 +100,14 @@ float draw_upright(const Pen& pen, float x0, float y0, float width, const Colour
   const float top = y + 0.5F * em, bottom = top + kRampHeight * em, right = x0 + 1.4F * em;
   for (int s = 0; s < kSteps; ++s) {
     const float a = static_cast<float>(s) / kSteps, b = static_cast<float>(s + 1) / kSteps;
-    pen.fill({x0, bottom - b * (bottom - top)}, {right, bottom - a * (bottom - top)}, ink_at(0.5F * (a + b)));
+    pen.fill({x0, bottom - b * (bottom - top)}, {right, bottom - a * (bottom - top)},
+             ink_at(scale, 0.5F * (a + b)));
   }
   pen.frame({x0, top}, {right, bottom}, pen.inks.edge);
+  if (const auto mark = mark_of(scale)) {
+    const float at = bottom - *mark * (bottom - top);
+    pen.line({x0 - 0.2F * em, at}, {right + 0.2F * em, at}, pen.inks.text, 2.0F);
+  }
   for (int tick = 0; tick <= 4; ++tick) {
     const float at = bottom - 0.25F * static_cast<float>(tick) * (bottom - top);
     pen.line({right, at}, {right + 0.3F * em, at}, pen.inks.text);
@@ -113,9 +128,14 @@ void draw_colour_scale(const Pen& pen, const PixelRect& where, const ColourScale
   const float top = y0 + 2.0F * em, bottom = top + 0.9F * em;
   for (int s = 0; s < kSteps; ++s) {
     const float a = static_cast<float>(s) / kSteps, b = static_cast<float>(s + 1) / kSteps;
-    pen.fill({left + a * (right - left), top}, {left + b * (right - left), bottom}, ink_at(0.5F * (a + b)));
+    pen.fill({left + a * (right - left), top}, {left + b * (right - left), bottom},
+             ink_at(scale, 0.5F * (a + b)));
   }
   pen.frame({left, top}, {right, bottom}, pen.inks.edge);
+  if (const auto mark = mark_of(scale)) {
+    const float x = left + *mark * (right - left);
+    pen.line({x, top - 0.2F * em}, {x, bottom + 0.2F * em}, pen.inks.text, 2.0F);
+  }
   for (int tick = 0; tick <= 4; ++tick) {
     const float x = left + (right - left) * static_cast<float>(tick) / 4.0F;
     pen.line({x, bottom}, {x, bottom + 0.25F * em}, pen.inks.text);

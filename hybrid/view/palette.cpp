@@ -116,12 +116,12 @@ double scale_end(double moved_m) {
   return 10.0 * power;
 }
 
-glm::vec3 of_displacement(const glm::vec3& own, float share) {
+glm::vec3 of_displacement(const glm::vec3& own, float share, const RampStart& start) {
   const float t = std::clamp(share, 0.0F, 1.0F);
   const float at = t * static_cast<float>(moved.size() - 1);
   const std::size_t low = std::min(static_cast<std::size_t>(at), moved.size() - 2);
   const glm::vec3 ramp = glm::mix(moved[low], moved[low + 1], at - static_cast<float>(low));
-  return glm::mix(own, ramp, glm::smoothstep(kOwnUntil, kRampFrom, t));
+  return glm::mix(own, ramp, glm::smoothstep(start.own_until, start.ramp_from, t));
 }
 
 }  // namespace hybrid::palette

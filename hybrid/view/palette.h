@@ -26,9 +26,7 @@ inline constexpr std::array<glm::vec3, 3> axes{
     {{0.835F, 0.369F, 0.0F}, {0.0F, 0.55F, 0.40F}, {0.0F, 0.447F, 0.698F}}};
 
 // The scale of a quantity of tissue, from 0 to its end: viridis (Smith & van der Walt 2015). Equal steps of
-// viridis look equal, to colour-blind readers too, and its lightness rises from end to end. Tissue that
-// hardly moved keeps its own colour: up to the share kOwnUntil of the scale only the own colour is drawn, and
-// from kRampFrom on only viridis.
+// viridis look equal, to colour-blind readers too, and its lightness rises from end to end.
 inline constexpr std::array<glm::vec3, 9> moved{{{0.267F, 0.005F, 0.329F},
                                                  {0.283F, 0.141F, 0.458F},
                                                  {0.229F, 0.322F, 0.546F},
@@ -38,7 +36,13 @@ inline constexpr std::array<glm::vec3, 9> moved{{{0.267F, 0.005F, 0.329F},
                                                  {0.369F, 0.789F, 0.383F},
                                                  {0.678F, 0.864F, 0.190F},
                                                  {0.993F, 0.906F, 0.144F}}};
-inline constexpr float kOwnUntil = 0.02F, kRampFrom = 0.15F;  // shares of the scale, see above
+// Shares of a scale: up to the first only the tissue's own colour is drawn, and from the second on only
+// viridis.
+struct RampStart {
+  float own_until = 0.0F, ramp_from = 0.0F;
+};
+inline constexpr RampStart kOwnFirst{0.02F, 0.15F};    // tissue that hardly moved keeps its own colour
+inline constexpr RampStart kRampAtOnce{5e-4F, 1e-3F};  // the own colour means that nothing is known
 
 inline constexpr std::array<glm::vec3, 4> rigid{
     {{0.89F, 0.84F, 0.72F}, {0.78F, 0.77F, 0.74F}, {0.80F, 0.71F, 0.55F}, {0.66F, 0.68F, 0.72F}}};
@@ -91,6 +95,6 @@ double scale_end(double moved_m);
 
 // Colour of a point on an object of colour `own`. The point's displacement is `share` (0 to 1) of the scale's
 // end. The renderer's shader has the same formula.
-glm::vec3 of_displacement(const glm::vec3& own, float share);
+glm::vec3 of_displacement(const glm::vec3& own, float share, const RampStart& start = kOwnFirst);
 
 }  // namespace hybrid::palette

@@ -39,7 +39,7 @@ void Renderer::State::draw_soft() {
 
 // Most tissue has its own colour, for which a cheaper program is enough.
 void Renderer::State::draw_tissue(const SceneMesh& object, float alpha) {
-  const float most_own = palette::kOwnUntil * static_cast<float>(scale.end);
+  const float most_own = scale.start().own_until * static_cast<float>(scale.end);
   use(Shading::plain, object.lit_by_vertex);
   draw_object(object, alpha, scale.end > 0.0 ? ValueRange{.up_to = most_own} : ValueRange{});
   if (scale.end > 0.0) {

@@ -76,8 +76,8 @@ struct Renderer::State {
     if (shading != Shading::tissue && shading != Shading::slice) return;
     uniform("moved_ramp", palette::moved);
     uniform("ramp_share", 1.0F);
-    uniform("own_until", palette::kOwnUntil);
-    uniform("ramp_from", palette::kRampFrom);
+    uniform("own_until", scale.start().own_until);
+    uniform("ramp_from", scale.start().ramp_from);
   }
   template <class Value>
   void uniform(const char* name, const Value& value) const {

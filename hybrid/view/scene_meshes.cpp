@@ -92,7 +92,7 @@ void SceneMeshes::move_surface(SceneMesh& mesh, const std::vector<glm::dvec3>& a
   const std::uint64_t number = tissue.values_number(object);
   if (!moved && number == mesh.values_number) return;
   // Up to this value tissue has its own colour.
-  const float own = palette::kOwnUntil * static_cast<float>(tissue.scale().end);
+  const float own = tissue.scale().start().own_until * static_cast<float>(tissue.scale().end);
   std::vector<PartMove> by(moved_m.size());  // [vertex]
   for (std::size_t v = 0; v < by.size(); ++v) {
     const bool first = mesh.moved_m.size() != moved_m.size();

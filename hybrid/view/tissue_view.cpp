@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "hybrid/view/palette.h"
 
@@ -15,13 +16,26 @@ namespace {
 // a pattern.
 constexpr double kLeastMoved = 1e-3;
 constexpr double kLeastStrain = 0.01;  // least end of the scale of strain
-// The scale of strain ends at this percentile of the places with at least kNoStrain. At the rim of a contact
-// single links have several times the strain of the tissue around them.
-constexpr double kStrainShare = 0.98;
-constexpr float kNoStrain = 1e-3F;
+constexpr double kLeast_jnd = 1.0;     // least end of the scale of differences: below it nothing is felt
+// The scales of strain and difference end at this percentile of the places with more than the least values.
+// At the rim of a contact single links have several times the strain of the tissue around them, and so have
+// differences at edges.
+constexpr double kEndShare = 0.98;
+constexpr float kNoStrain = 1e-3F, kNo_jnd = 0.02F;
 
 bool needs_field(TissueColour colour) {
   return colour == TissueColour::strain || colour == TissueColour::limits;
+}
+
+// Raises the end of a scale of these values, if they go beyond it.
+void raise_end(double& end, double least_end, float least, std::vector<float> values) {
+  std::erase_if(values, [least](float value) { return !(value >= least); });
+  if (values.empty()) return;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(kEndShare * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  const auto size = static_cast<double>(*at);
+  if (size > std::max(end, least_end)) end = palette::scale_end(size);
 }
 
 // Equal settings give equal numbers, in every view of a scene; never 0.
@@ -48,6 +62,13 @@ void TissueView::set(const ViewSettings& view) {
   const bool planes = fresh_ || view.slices != view_.slices;
   const bool field = fresh_ || needs_field(view.colour) != needs_field(view_.colour);
   const bool colour = view.colour != view_.colour;
+  if (differs_ && view.colour != TissueColour::difference) {
+    differs_ = false;
+    for (Object& object : objects_) {
+      object.values.clear();
+      object.values_number = ++number_;
+    }
+  }
   fresh_ = false;
   view_ = view;
   for (std::size_t o = 0; o < objects_.size(); ++o) {
@@ -137,6 +158,7 @@ void TissueView::ask() {
 }
 
 void TissueView::take(const Snapshot& snapshot) {
+  if (view_.colour == TissueColour::difference) take_difference(snapshot.difference.get());
   for (std::size_t o = 0; o < objects_.size(); ++o) {
     if (view_.colour == TissueColour::displacement && o < snapshot.soft_moved_m.size()) {
       float most = 0.0F;
@@ -165,7 +187,7 @@ void TissueView::take(std::size_t o, const std::vector<glm::vec3>& moved_m) {
   if (object.surface) {
     object.values = object.surface->values(view_.colour, next(object.surface->points_m().size()));
     object.values_number = ++number_;
-    if (view_.colour == TissueColour::strain) note_strain(object.values);
+    if (view_.colour == TissueColour::strain) raise_end(most_strain_, kLeastStrain, kNoStrain, object.values);
   }
   for (std::size_t s = 0; s < object.slices.size(); ++s) {
     TissueSlice& slice = object.slices[s];
@@ -174,9 +196,10 @@ void TissueView::take(std::size_t o, const std::vector<glm::vec3>& moved_m) {
     if (object.nets[s]) {
       values = object.nets[s]->values(view_.colour, next(object.nets[s]->points_m().size()));
     } else {
-      for (const glm::vec3& by : nodes) values.push_back(glm::length(by));
+      const bool differs = view_.colour == TissueColour::difference;  // known on surfaces alone
+      for (const glm::vec3& by : nodes) values.push_back(differs ? 0.0F : glm::length(by));
     }
-    if (view_.colour == TissueColour::strain) note_strain(values);
+    if (view_.colour == TissueColour::strain) raise_end(most_strain_, kLeastStrain, kNoStrain, values);
     if (view_.colour == TissueColour::displacement) {
       for (const float value : values) note_moved(value);
     }
@@ -191,14 +214,33 @@ void TissueView::note_moved(float moved_m) {
     most_moved_m_ = palette::scale_end(size);
 }
 
-void TissueView::note_strain(std::vector<float> strains) {
-  std::erase_if(strains, [](float strain) { return !(strain >= kNoStrain); });
-  if (strains.empty()) return;
-  const auto at =
-      strains.begin() + static_cast<std::ptrdiff_t>(kStrainShare * static_cast<double>(strains.size() - 1));
-  std::nth_element(strains.begin(), at, strains.end());
-  const auto size = static_cast<double>(*at);
-  if (size > std::max(most_strain_, kLeastStrain)) most_strain_ = palette::scale_end(size);
+// Where nothing is known tissue has its own colour. Elsewhere a value is at least where the ramp begins.
+void TissueView::take_difference(const FeltDifference* difference) {
+  const std::uint64_t number = difference != nullptr ? difference->number : 0;
+  if (difference_ == number && differs_) return;
+  differs_ = true;
+  difference_ = number;
+  if (difference != nullptr && std::exchange(comparison_, difference->comparison) != difference->comparison)
+    most_jnd_ = 0.0;
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    std::vector<float>& values = objects_[o].values;
+    values.assign(scene_.objects[o].surface.vertices.size(), 0.0F);
+    objects_[o].values_number = ++number_;
+    if (difference == nullptr || difference->object != o || difference->jnd.size() != values.size()) continue;
+    for (std::size_t v = 0; v < values.size(); ++v)
+      values[v] = std::isnan(difference->jnd[v]) ? 0.0F : difference->jnd[v];
+    raise_end(most_jnd_, kLeast_jnd, kNo_jnd, values);
+    const float least = palette::kRampAtOnce.ramp_from * static_cast<float>(std::max(most_jnd_, kLeast_jnd));
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      if (!std::isnan(difference->jnd[v])) values[v] = std::max(values[v], least);
+    }
+  }
+}
+
+std::string TissueView::in_words() const {
+  if (view_.colour == TissueColour::difference && difference_ == 0)
+    return "No two models are compared yet. Begin in the panel: Difference of two models.";
+  return view_.grey ? scans_.in_words() : std::string();
 }
 
 ColourScale TissueView::scale() const {
@@ -211,6 +253,8 @@ ColourScale TissueView::scale() const {
       return {TissueColour::strain, std::max(most_strain_, kLeastStrain)};
     case TissueColour::limits:
       return {TissueColour::limits, 1.0};
+    case TissueColour::difference:
+      return {TissueColour::difference, difference_ == 0 ? 0.0 : std::max(most_jnd_, kLeast_jnd)};
   }
   return {};
 }

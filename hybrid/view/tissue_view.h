@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hybrid/snapshot/snapshot.h"
+#include "hybrid/view/palette.h"
 #include "hybrid/view/tissue/scan_values.h"
 #include "hybrid/view/tissue/section.h"
 #include "hybrid/view/view_settings.h"
@@ -17,8 +18,11 @@ namespace hybrid {
 // The scale of colours: from 0 to `end`. 0: nothing is coloured.
 struct ColourScale {
   TissueColour colour = TissueColour::displacement;
-  double end = 0.0;  // m; for strain and limits a share
+  double end = 0.0;  // m; for strain and limits a share; for a difference JND
 
+  [[nodiscard]] palette::RampStart start() const {
+    return colour == TissueColour::difference ? palette::kRampAtOnce : palette::kOwnFirst;
+  }
   friend bool operator==(const ColourScale&, const ColourScale&) = default;
 };
 
@@ -45,7 +49,7 @@ class TissueView {
   [[nodiscard]] const std::vector<TissueSlice>& slices(std::size_t object) const {
     return objects_[object].slices;
   }
-  // The value at each vertex of the surface, for strain and limits; otherwise empty.
+  // The value at each vertex of the surface. Empty: its displacement.
   [[nodiscard]] const std::vector<float>& values(std::size_t object) const { return objects_[object].values; }
   // Rises when values() changes.
   [[nodiscard]] std::uint64_t values_number(std::size_t object) const {
@@ -54,8 +58,9 @@ class TissueView {
   // The scale of the present colouring. Its end is a round number that never falls, so that colours keep
   // their meaning from frame to frame. A few places of tissue may have a larger strain.
   [[nodiscard]] ColourScale scale() const;
-  // The progress of reading the scans (Scans::in_words()), or empty if no grey values are shown.
-  [[nodiscard]] std::string in_words() const { return view_.grey ? scans_.in_words() : std::string(); }
+  // The progress of reading the scans (Scans::in_words()) if grey values are shown; a colouring that has
+  // nothing to show; else empty.
+  [[nodiscard]] std::string in_words() const;
 
  private:
   struct Object {
@@ -72,20 +77,22 @@ class TissueView {
   void paint(std::size_t object);
   void ask();
   void take(std::size_t object, const std::vector<glm::vec3>& moved_m);
+  void take_difference(const FeltDifference* difference);
   void note_moved(float moved_m);
-  void note_strain(std::vector<float> strains);
 
   const DrawnScene& scene_;
   glm::dvec3 origin_m_;
   SoftBox box_;
   ViewSettings view_;
-  bool fresh_ = true;  // no settings were taken yet
+  bool fresh_ = true;     // no settings were taken yet
+  bool differs_ = false;  // values are those of a difference
   std::vector<Object> objects_;
   std::vector<std::uint8_t> painted_grey_;  // [object] its slices show grey values
   std::shared_ptr<const AskedPoints> asked_;
   Scans scans_;
   std::uint64_t number_ = 0;
-  double most_moved_m_ = 0.0, most_strain_ = 0.0;  // ends of the scales
+  double most_moved_m_ = 0.0, most_strain_ = 0.0, most_jnd_ = 0.0;  // ends of the scales
+  std::uint64_t comparison_ = 0, difference_ = 0;  // of the FeltDifference that the values show; 0: of none
 };
 
 }  // namespace hybrid

@@ -8,10 +8,13 @@
 #include <span>
 #include <string>
 
+#include "hybrid/view/layout.h"
 #include "hybrid/view/text_painter.h"
 
 namespace hybrid::controls {
 
+// Reserves a place for a chart. Whatever comes next is below it.
+[[nodiscard]] PixelRect take_place(float height);
 // Writes a label at the left; the next control comes beside it.
 void label_beside(const Pen& pen, const std::string& words);
 // Writes a label in a line of controls.

@@ -7,6 +7,7 @@
 #include "hybrid/base/number_text.h"
 #include "hybrid/view/overlay.h"
 #include "hybrid/view/palette.h"
+#include "hybrid/window/panel_words.h"
 #include "hybrid/window/panels.h"
 
 namespace hybrid {
@@ -25,15 +26,14 @@ constexpr std::array<glm::vec3, kForceSeries> kSeries{{{0.03F, 0.38F, 0.93F},
                                                        {0.90F, 0.62F, 0.00F}}};
 constexpr std::array<const char*, kForceSeries> kSeriesNames{
     "total", "rigid", "soft", "friction", "damping, texture", "limits", "passivity"};
+// The series of each ForcePart, with its colour and name.
+constexpr std::array<ForceSeries, kForceParts> kSeriesOfPart{ForceSeries::rigid,    ForceSeries::soft,
+                                                             ForceSeries::friction, ForceSeries::damping,
+                                                             ForceSeries::limits,   ForceSeries::passivity};
 constexpr glm::vec3 kAtRest{0.70F, 0.70F, 0.78F};  // band of the force at rest
 constexpr std::size_t kAlways = 3;  // the first series are always named; the others if they occur
 // A part that stays below this share of the chart's height does not occur.
 constexpr double kLeastShown = 0.005;
-
-// For example "85.2 µs" or "1.23 ms".
-std::string tick_time_text(double us) {
-  return us < kPeriod_us ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
-}
 
 constexpr float kKeyRow = 1.35F;  // row pitch of the names of series (em)
 
@@ -140,6 +140,12 @@ std::string words_at_rest(const TickHistory& history) {
          with_decimals(most_jnd, 1) + " JND";
 }
 
+void draw_time_axis(const Pen& pen, float left, float right, float bottom, const TickHistory& history) {
+  const std::string from = "-" + with_decimals(history.seconds(), 0) + " s", to = "now";
+  pen.text(left, bottom + 0.3F * pen.em, pen.inks.pale, from);
+  pen.text(right - pen.width(to), bottom + 0.3F * pen.em, pen.inks.pale, to);
+}
+
 }  // namespace
 
 void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history) {
@@ -167,9 +173,61 @@ void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory&
     draw_at_rest(pen, box, history, top_N);
   }
   for (const ForceSeries series : shown) draw_series(pen, box, history, series, top_N);
-  const std::string from = "-" + with_decimals(history.seconds(), 0) + " s", to = "now";
-  pen.text(box.left, box.bottom + 0.3F * em, pen.inks.pale, from);
-  pen.text(box.right - pen.width(to), box.bottom + 0.3F * em, pen.inks.pale, to);
+  draw_time_axis(pen, box.left, box.right, box.bottom, history);
+}
+
+void draw_force_parts(const Pen& pen, const PixelRect& where, const TickHistory& history) {
+  const float em = pen.em;
+  const auto x0 = static_cast<float>(where.x), y0 = static_cast<float>(where.y);
+  const auto x1 = x0 + static_cast<float>(where.width), y1 = y0 + static_cast<float>(where.height);
+  const float left = x0 + pen.width("-0.888 N") + 0.5F * em, top = y0 + (1.7F + kKeyRow) * em,
+              bottom = y1 - 1.5F * em;
+  const auto count = static_cast<std::size_t>(std::max(x1 - left, 1.0F));
+  const auto columns = history.parts(count);
+  double above_N = 0.0, below_N = 0.0;
+  std::array<float, kForceParts> most{};
+  for (const auto& parts : columns) {
+    double up = 0.0, down = 0.0;
+    for (std::size_t p = 0; parts && p < kForceParts; ++p) {
+      const float part = (*parts)[p];
+      if (!std::isfinite(part)) continue;
+      (part > 0.0F ? up : down) += std::abs(static_cast<double>(part));
+      most[p] = std::max(most[p], std::abs(part));
+    }
+    above_N = std::max(above_N, up);
+    below_N = std::max(below_N, down);
+  }
+  const double high_N = axis_end(above_N), low_N = below_N > kLeastShown * high_N ? axis_end(below_N) : 0.0;
+  const auto y_of = [&](double force_N) {
+    return top + static_cast<float>((high_N - force_N) / (high_N + low_N)) * (bottom - top);
+  };
+  for (std::size_t c = 0; c < count; ++c) {
+    if (!columns[c]) continue;
+    const float x = left + static_cast<float>(c);
+    double up = 0.0, down = 0.0, felt = 0.0;
+    for (std::size_t p = 0; p < kForceParts; ++p) {
+      const double part = static_cast<double>((*columns[c])[p]);
+      if (!std::isfinite(part)) continue;
+      double& end = part > 0.0 ? up : down;
+      pen.fill({x, y_of(std::max(end, end + part))}, {x + 1.0F, y_of(std::min(end, end + part))},
+               ink_of(kSeries[static_cast<std::size_t>(kSeriesOfPart[p])]));
+      end += part;
+      felt += part;
+    }
+    pen.fill({x, y_of(felt) - 1.0F}, {x + 1.0F, y_of(felt) + 1.0F}, pen.inks.text);
+  }
+  for (const double at_N : {high_N, 0.0, -low_N}) {
+    const std::string words = at_N == 0.0 ? "0" : at_N < 0.0 ? "-" + force_text(-at_N) : force_text(at_N);
+    pen.line({left, y_of(at_N)}, {x1, y_of(at_N)}, pen.inks.edge);
+    if (at_N < 0.0 && y_of(at_N) - y_of(0.0) < 1.2F * em) continue;  // it would cover the zero
+    pen.text(left - 0.5F * em - pen.width(words), y_of(at_N) - 0.6F * em, pen.inks.pale, words);
+  }
+  std::vector<ForceSeries> shown{ForceSeries::soft, ForceSeries::rigid};
+  for (std::size_t p = 2; p < kForceParts; ++p) {
+    if (static_cast<double>(most[p]) > kLeastShown * high_N) shown.push_back(kSeriesOfPart[p]);
+  }
+  draw_keys(pen, x1, y0, shown);
+  draw_time_axis(pen, left, x1, bottom, history);
 }
 
 void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& times) {

@@ -33,10 +33,6 @@ bool took_other(const Pen& pen, const char* label, const char* id, bool second,
   return taken && (*taken == 1) != second;
 }
 
-std::string time_words(double us) {
-  return us < 1000.0 ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
-}
-
 std::string force_words(double force_N) {
   return force_N > 0.0 ? force_text(force_N) : "none";
 }
@@ -122,7 +118,7 @@ void Panels::draw_effect(const Pen& pen, const PanelFrame& frame) const {
     rows.push_back({"largest force, 5 s", force_text(mark->most_before_N),
                     force_text(frame.history.most_N(ForceSeries::total, mark->t_s, ever))});
     const auto of = [](const TickTimes& times, double us) {
-      return times.ticks > 0 ? time_words(us) : std::string("no tick");
+      return times.ticks > 0 ? tick_time_text(us) : std::string("no tick");
     };
     rows.push_back({"tick, median", of(mark->before, mark->before.p50_us), of(after, after.p50_us)});
     rows.push_back({"tick, 99 %", of(mark->before, mark->before.p99_us), of(after, after.p99_us)});

@@ -41,8 +41,9 @@ void hand_over(ImGuiIO& io, const UiInput& input) {
 
 constexpr const char* kPanelName = "panel";
 // heights (unit: body text)
-constexpr float kForceChart_em = 8.5F, kTickChart_em = 6.0F, kStageRow_em = 1.25F;
-constexpr std::array<double, 3> kSpeeds{1.0, 0.1, 0.01};  // of the session, relative to real time
+constexpr float kTickChart_em = 6.0F, kStageRow_em = 1.25F;
+constexpr std::array<double, 4> kSpeeds{1.0, 0.1, 0.01,
+                                        kLeastSpeed};  // of the session, relative to real time
 
 ImVec4 colour_of(Ink ink, float alpha = 1.0F) {
   ImVec4 colour = ImGui::ColorConvertU32ToFloat4(ink);
@@ -103,18 +104,16 @@ bool open_section(const char* name, bool open = true) {
   return ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
 }
 
-// Reserves a place for a chart in the panel, and moves the cursor below it.
+}  // namespace
+
+namespace controls {
+
 PixelRect take_place(float height) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const float width = ImGui::GetContentRegionAvail().x;
   ImGui::Dummy({width, height});
   return {static_cast<int>(at.x), static_cast<int>(at.y), static_cast<int>(width), static_cast<int>(height)};
 }
-
-}  // namespace
-
-namespace controls {
-
 void label_beside(const Pen& pen, const std::string& words) {
   label(words);
   ImGui::SameLine(9.2F * pen.em);
@@ -198,7 +197,8 @@ float gap() {
 
 }  // namespace controls
 
-void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const {
+void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, const TickTimes& times,
+                          PanelResult& result) const {
   const ViewState& state = frame.state;
   const auto ask = [&](ViewVerb verb, std::vector<double> numbers = {}) {
     result.actions.push_back({.verb = verb, .numbers = std::move(numbers)});
@@ -210,7 +210,7 @@ void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, Pan
   if (wide_button("Restart", 1)) ask(ViewVerb::restart);
   ImGui::BeginDisabled(frame.notes.real_device);
   for (std::size_t n = 0; n < kSpeeds.size(); ++n) {
-    static constexpr std::array<const char*, kSpeeds.size()> words{"real time", "1/10", "1/100"};
+    static constexpr std::array<const char*, kSpeeds.size()> words{"real time", "1/10", "1/100", "1/1000"};
     if (n > 0) ImGui::SameLine();
     if (wide_button(words[n], static_cast<int>(kSpeeds.size() - n), state.speed == kSpeeds[n]))
       ask(ViewVerb::speed, {kSpeeds[n]});
@@ -227,6 +227,10 @@ void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, Pan
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("Writes the edited values into the scene's file");
   ImGui::TextDisabled("tick %llu, %s s recorded", static_cast<unsigned long long>(snapshot.tick),
                       with_decimals(frame.notes.recorded_s, 1).c_str());
+  const std::string late = times.late == 0 ? "none late" : std::to_string(times.late) + " late";
+  ImGui::TextDisabled("last %s s: %s, 99 %% of ticks within %s",
+                      with_decimals(frame.history.seconds(), 0).c_str(), late.c_str(),
+                      tick_time_text(times.p99_us).c_str());
   if (frame.notes.refused_edits > 0)
     ImGui::TextDisabled("%llu edits came too fast and were left out",
                         static_cast<unsigned long long>(frame.notes.refused_edits));
@@ -353,6 +357,7 @@ void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot
   const bool tissue = selected < scene.objects.size() && scene.objects[selected].choices.tissue;
   if (tissue) draw_choices(pen, scene, frame, result);
   if (!any && !tissue) ImGui::TextDisabled("Its values are fixed while it is felt.");
+  if (selected == Edit::kTool) ImGui::TextDisabled("Select an object above to change its stiffness.");
   if (selected < scene.objects.size()) {
     controls::label_beside(pen, "opacity");
     float opacity = 100.0F * frame.state.view.look_of(selected).opacity;
@@ -403,8 +408,9 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   if (ImGui::Begin(kPanelName, nullptr, flags)) {
     if (frame.input.by_keyboard && !ImGui::IsWindowFocused(ImGuiFocusedFlags_ChildWindows))
       ImGui::SetWindowFocus();
+    const TickTimes times = frame.history.times();
     if (open_section("Session")) {
-      draw_session(frame, snapshot, result);
+      draw_session(frame, snapshot, times, result);
       draw_past(pen, frame, result);
     }
     if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
@@ -417,22 +423,20 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
       draw_effect(pen, frame);
     if (open_section("View")) draw_view(pen, scene, frame, result);
+    if (has_soft(scene) && open_section("Difference of two models", false))
+      draw_difference(pen, scene, snapshot, frame, result);
     Pen chart = pen;
     chart.list = ImGui::GetWindowDrawList();
-    if (open_section("Force")) {
-      bool rest = frame.state.compares_with_rest;
-      if (has_soft(scene) && controls::tick_box("compare with the force at rest", rest))
-        result.actions.push_back({.verb = ViewVerb::rest, .numbers = {rest ? 1.0 : 0.0}});
-      draw_force_chart(chart, take_place(kForceChart_em * pen.em), frame.history);
-    }
+    if (open_section("Force")) draw_force(chart, scene, frame, result);
     if (open_section("Ticks")) {
-      const TickTimes times = frame.history.times();
-      draw_tick_times(chart, take_place(kTickChart_em * pen.em), times);
-      draw_stage_times(chart, take_place(kStageRow_em * pen.em * static_cast<float>(kStages)), times);
+      draw_tick_times(chart, controls::take_place(kTickChart_em * pen.em), times);
+      draw_stage_times(chart, controls::take_place(kStageRow_em * pen.em * static_cast<float>(kStages)),
+                       times);
       if (frame.notes.unseen_ticks > 0)
         ImGui::TextDisabled("%llu ticks are not in the charts",
                             static_cast<unsigned long long>(frame.notes.unseen_ticks));
     }
+    if (open_section("Numbers of the tick", !frame.state.watched.empty())) draw_watch(pen, frame, result);
   }
   ImGui::End();
   result.wants_text = ImGui::GetIO().WantTextInput;

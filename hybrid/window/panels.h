@@ -31,6 +31,7 @@ struct SessionNotes {
   std::size_t kept_bytes = 0;
   std::string building{};                // progress of a changed scene that is built; empty: none
   std::optional<ChangeEffect> effect{};  // of the last change of the scene
+  std::string comparing{};               // progress of a comparison of two models; empty: none goes on
 };
 
 // The data that the panel shows in one frame.
@@ -62,7 +63,8 @@ class Panels final : public OverlayPanel {
             const PixelRect& where) override;
 
  private:
-  void draw_session(const PanelFrame& frame, const Snapshot& snapshot, PanelResult& result) const;
+  void draw_session(const PanelFrame& frame, const Snapshot& snapshot, const TickTimes& times,
+                    PanelResult& result) const;
   void draw_objects(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                     const PanelFrame& frame, PanelResult& result) const;
   void draw_presses(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
@@ -75,6 +77,13 @@ class Panels final : public OverlayPanel {
   void draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
   void draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result);
   void draw_effect(const Pen& pen, const PanelFrame& frame) const;
+  // ---- panel_force.cpp ----
+  void draw_force(const Pen& chart, const DrawnScene& scene, const PanelFrame& frame,
+                  PanelResult& result) const;
+  void draw_watch(const Pen& pen, const PanelFrame& frame, PanelResult& result) const;
+  // ---- panel_difference.cpp ----
+  void draw_difference(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                       const PanelFrame& frame, PanelResult& result);
   // ---- panel_view.cpp ----
   void draw_past(const Pen& pen, const PanelFrame& frame, PanelResult& result) const;
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
@@ -97,6 +106,14 @@ class Panels final : public OverlayPanel {
     int frames_left = 0;  // for which it is shown although nothing is built
   };
   std::optional<AskedYoung> asked_young_;
+  // The models of an object that the user chose to compare.
+  struct ChosenModels {
+    const DrawnScene* scene = nullptr;
+    std::uint32_t object = Edit::kTool;
+    std::size_t a = 0, b = 1;  // indices in model_options()
+    float depth_mm = 0.0F;
+  };
+  ChosenModels chosen_;
 };
 
 // Draws the arrows by which an object is moved (panel_handles.cpp).
@@ -107,6 +124,9 @@ void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera&
 // Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in
 // it.
 void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history);
+// The same as areas: what each part adds lies above the line of zero, what it takes away below. A line is the
+// force on the hand.
+void draw_force_parts(const Pen& pen, const PixelRect& where, const TickHistory& history);
 // Draws tick times on a logarithmic axis, with a line at the servo period.
 void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& times);
 // Draws the mean time of each stage as a bar.

@@ -58,25 +58,54 @@ void TickHistory::add(const ForceAtRest& found) {
   while (at_rest_.front().t_s <= end_s() - seconds_) at_rest_.pop_front();
 }
 
+// Columns begin at whole multiples of their width in time, not relative to the newest tick. So the ticks of a
+// column stay together while the chart scrolls.
+std::size_t TickHistory::column_of(const TickSample& sample, std::size_t count) const {
+  const double step_s = seconds_ / static_cast<double>(count);
+  const auto last = static_cast<std::int64_t>(std::floor(end_s() / step_s));
+  const auto column = static_cast<std::int64_t>(std::floor(sample.t_s / step_s)) - last +
+                      static_cast<std::int64_t>(count) - 1;
+  return static_cast<std::size_t>(std::clamp<std::int64_t>(column, 0, static_cast<std::int64_t>(count) - 1));
+}
+
 std::vector<std::optional<ColumnRange>> TickHistory::columns(ForceSeries series, std::size_t count) const {
   std::vector<std::optional<ColumnRange>> columns(count);
   if (count == 0) return columns;
-  // Columns begin at whole multiples of step_s, not relative to the newest tick. So the ticks of a column
-  // stay together while the chart scrolls.
-  const double step_s = seconds_ / static_cast<double>(count);
-  const auto last = static_cast<std::int64_t>(std::floor(end_s() / step_s));
   for (const TickSample& sample : samples_) {
-    const auto column = static_cast<std::int64_t>(std::floor(sample.t_s / step_s)) - last +
-                        static_cast<std::int64_t>(count) - 1;
     const float force = force_of(sample, series);
     if (!std::isfinite(force)) continue;
-    std::optional<ColumnRange>& at = columns[static_cast<std::size_t>(
-        std::clamp<std::int64_t>(column, 0, static_cast<std::int64_t>(count) - 1))];
+    std::optional<ColumnRange>& at = columns[column_of(sample, count)];
     if (!at) at = ColumnRange{force, force};
     at->least_N = std::min(at->least_N, force);
     at->most_N = std::max(at->most_N, force);
   }
   return columns;
+}
+
+std::vector<std::optional<TickHistory::Parts>> TickHistory::parts(std::size_t count) const {
+  std::vector<std::optional<Parts>> parts(count);
+  std::vector<float> most(count, -1.0F);
+  if (count == 0) return parts;
+  for (const TickSample& sample : samples_) {
+    const std::size_t column = column_of(sample, count);
+    if (!(sample.total_N > most[column])) continue;
+    most[column] = sample.total_N;
+    parts[column] = sample.along_N;
+  }
+  return parts;
+}
+
+std::optional<TickHistory::NumberRange> TickHistory::range(
+    const std::function<double(const TickSample&)>& of) const {
+  if (samples_.empty()) return std::nullopt;
+  const double now = of(samples_.back());
+  NumberRange range{now, now, now};
+  for (const TickSample& sample : samples_) {
+    const double value = of(sample);
+    range.least = std::min(range.least, value);
+    range.most = std::max(range.most, value);
+  }
+  return range;
 }
 
 void TickHistory::mark(double t_s) {

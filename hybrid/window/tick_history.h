@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -66,6 +67,15 @@ class TickHistory {
 
   // The range of forces in each of `count` columns, the newest last. Empty: no tick is in the column.
   [[nodiscard]] std::vector<std::optional<ColumnRange>> columns(ForceSeries series, std::size_t count) const;
+  // The parts of the force, in each of `count` columns: of the tick with the largest force in it. Empty: no
+  // tick is in the column.
+  using Parts = std::array<float, kForceParts>;
+  [[nodiscard]] std::vector<std::optional<Parts>> parts(std::size_t count) const;
+  // A number of the newest tick, and its range. Empty: there is no tick.
+  struct NumberRange {
+    double now = 0.0, least = 0.0, most = 0.0;
+  };
+  [[nodiscard]] std::optional<NumberRange> range(const std::function<double(const TickSample&)>& of) const;
   [[nodiscard]] double most_N(ForceSeries series) const;  // largest force
   [[nodiscard]] double most_N() const;                    // of all series
   [[nodiscard]] double most_N(ForceSeries series, double from_s, double to_s) const;
@@ -74,6 +84,8 @@ class TickHistory {
   [[nodiscard]] TickTimes times(double from_s, double to_s) const;
 
  private:
+  [[nodiscard]] std::size_t column_of(const TickSample& sample, std::size_t count) const;
+
   double seconds_;
   std::deque<TickSample> samples_;
   std::deque<ForceAtRest> at_rest_;

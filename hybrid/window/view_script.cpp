@@ -8,11 +8,15 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "hybrid/window/watched_numbers.h"
 #include "hybrid/window/window.h"
 #include "hybrid/window/window_keys.h"
 
 namespace hybrid {
 namespace {
+
+constexpr double kLeast_mm = 1e-3, kMost_mm = 1e6;  // of a spacing; scenes refuse others
+constexpr std::size_t kScriptPlaces = 300;          // of a difference of two models
 
 // The kinds of arguments that a command has.
 enum class ScriptArguments : std::uint8_t {
@@ -27,11 +31,13 @@ enum class ScriptArguments : std::uint8_t {
   spacing,        // tissue, and millimetres
   young,          // a material, and pascals
   move,           // an object, and three numbers: millimetres
+  difference,     // "off", or tissue, two models, millimetres, and a number of places, which may be left out
   look,           // "all", "contact", "x", "y" or "z"
   clip,           // "off", or an axis and a number
   slice,          // "off", or an axis, and a number or "off"
   colour,         // one of kTissueColours
   file,           // a file name; may be left out
+  watched,        // the name of a number of the tick
   key,
   point,  // two numbers
   drag,   // four numbers, and a button, which may be left out
@@ -42,10 +48,12 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 34> kScriptCommands{
+constexpr std::array<ScriptCommand, 37> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
      {"rest", ViewVerb::rest, ScriptArguments::on_or_off, "rest on"},
+     {"stack", ViewVerb::stack, ScriptArguments::on_or_off, "stack on"},
+     {"watch", ViewVerb::watch, ScriptArguments::watched, "watch \"device x\""},
      {"speed", ViewVerb::speed, ScriptArguments::number, "speed 0.1"},
      {"restart", ViewVerb::restart, ScriptArguments::none, "restart"},
      {"edit", ViewVerb::edit, ScriptArguments::edit, "edit tool stiffness 600"},
@@ -54,6 +62,7 @@ constexpr std::array<ScriptCommand, 34> kScriptCommands{
      {"spacing", ViewVerb::change, ScriptArguments::spacing, "spacing brain 2.5"},
      {"young", ViewVerb::change, ScriptArguments::young, "young fat 3000"},
      {"move", ViewVerb::change, ScriptArguments::move, "move plate 0 0 2"},
+     {"difference", ViewVerb::difference, ScriptArguments::difference, "difference brain as-is trilinear 3"},
      {"back", ViewVerb::look_back, ScriptArguments::number, "back 5"},
      {"go-on", ViewVerb::go_on, ScriptArguments::none, "go-on"},
      {"arrows", ViewVerb::arrows, ScriptArguments::on_or_off, "arrows on"},
@@ -125,8 +134,15 @@ class ScriptLine {
            "; write a time and one of these: " + names);
   }
 
+  [[noreturn]] void refuse_number() const {
+    std::string names;
+    for (const WatchedNumber& number : watched_numbers()) names += (names.empty() ? "" : ", ") + number.name;
+    refuse("a tick has no number '" + words_[2] + "'; it has " + names);
+  }
   [[nodiscard]] double number(std::size_t n, double low, double high) const {
-    const std::string word = n < words_.size() ? words_[n] : std::string();
+    return number_in(n < words_.size() ? words_[n] : std::string(), low, high);
+  }
+  [[nodiscard]] double number_in(const std::string& word, double low, double high) const {
     double value = 0.0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size() || !(value >= low && value <= high))
@@ -194,7 +210,6 @@ class ScriptLine {
 
   void read_change(ScriptArguments kind, ViewAction& action) const {
     using ChangedKey = SceneChange::Key;
-    constexpr double least_mm = 1e-3, most_mm = 1e6;   // of a spacing; scenes refuse others
     constexpr double least_Pa = 1e-3, most_Pa = 1e13;  // as a scene's file
     SceneChange& change = action.change;
     const bool moves = kind == ScriptArguments::move;
@@ -217,7 +232,7 @@ class ScriptLine {
         break;
       case ScriptArguments::spacing:
         change.key = ChangedKey::spacing;
-        change.value.x = 1e-3 * number(3, least_mm, most_mm);
+        change.value.x = 1e-3 * number(3, kLeast_mm, kMost_mm);
         break;
       case ScriptArguments::young:
         change.key = ChangedKey::young;
@@ -226,8 +241,43 @@ class ScriptLine {
       default:
         change.key = ChangedKey::move;
         for (int d = 0; d < 3; ++d)
-          change.value[d] = 1e-3 * number(3 + static_cast<std::size_t>(d), -most_mm, most_mm);
+          change.value[d] = 1e-3 * number(3 + static_cast<std::size_t>(d), -kMost_mm, kMost_mm);
     }
+  }
+
+  // A model: "as-is", or changes with "+" between them: an energy, "rigid", or a spacing in millimetres.
+  [[nodiscard]] std::vector<SceneChange> model(std::size_t n, const std::string& object) const {
+    std::vector<SceneChange> changes;
+    if (words_[n] == "as-is") return changes;
+    std::size_t at = 0;
+    while (at <= words_[n].size()) {
+      const std::size_t end = std::min(words_[n].find('+', at), words_[n].size());
+      const std::string word = words_[n].substr(at, end - at);
+      at = end + 1;
+      SceneChange change{.name = object};
+      if (word == "six-link" || word == "trilinear") {
+        change.key = SceneChange::Key::energy;
+        change.value.x = word == "trilinear" ? 1.0 : 0.0;
+      } else if (word == "rigid" || word == "voxels") {
+        change.value.x = word == "rigid" ? 1.0 : 0.0;
+      } else {
+        change.key = SceneChange::Key::spacing;
+        change.value.x = 1e-3 * number_in(word, kLeast_mm, kMost_mm);
+      }
+      changes.push_back(change);
+    }
+    return changes;
+  }
+
+  void read_difference(ViewAction& action) const {
+    if (words_.size() == 3 && words_[2] == "off") return;
+    expect(4, 5);
+    ModelComparison& comparison = action.comparison;
+    comparison.object = tissue(2);
+    comparison.a = model(3, comparison.object);
+    comparison.b = model(4, comparison.object);
+    comparison.depth_m = 1e-3 * number(5, kLeast_mm, kMost_mm);
+    comparison.places = words_.size() > 6 ? static_cast<std::size_t>(number(6, 1.0, 1e6)) : kScriptPlaces;
   }
 
   [[nodiscard]] double axis(std::size_t n) const {
@@ -292,6 +342,9 @@ class ScriptLine {
       case ScriptArguments::move:
         read_change(command.arguments, action);
         break;
+      case ScriptArguments::difference:
+        read_difference(action);
+        break;
       case ScriptArguments::look:
         expect(1, 1);
         choose(2, {"all", "contact", "x", "y", "z"});
@@ -314,6 +367,11 @@ class ScriptLine {
       case ScriptArguments::file:
         expect(0, 1);
         if (words_.size() > 2) action.text = words_[2];
+        break;
+      case ScriptArguments::watched:
+        expect(1, 1);
+        if (watched_number_named(words_[2]) == nullptr) refuse_number();
+        action.text = words_[2];
         break;
       case ScriptArguments::key:
         expect(1, 1);

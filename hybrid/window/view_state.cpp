@@ -105,6 +105,10 @@ void act_on_session(ViewState& state, const ViewAction& action) {
     case ViewVerb::change:
       state.changes.push_back(action.change);
       break;
+    case ViewVerb::difference:
+      state.comparison = action.comparison;
+      if (!action.comparison.object.empty()) state.view.colour = TissueColour::difference;
+      break;
     case ViewVerb::screenshot:
       state.screenshot = action.text;
       break;
@@ -149,6 +153,12 @@ void act(ViewState& state, const ViewAction& action) {
       return;
     case ViewVerb::arrows:
       set_or_flip(state.moves, action);
+      return;
+    case ViewVerb::stack:
+      set_or_flip(state.stacked, action);
+      return;
+    case ViewVerb::watch:
+      if (std::erase(state.watched, action.text) == 0) state.watched.push_back(action.text);
       return;
     case ViewVerb::panels:
       set_or_flip(state.panels, action);

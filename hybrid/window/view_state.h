@@ -17,10 +17,13 @@ enum class ViewVerb : std::uint8_t {
   pause,           // numbers: 1 on, 0 off, none: toggle
   step,            // does one tick while paused
   rest,            // numbers: 1 compares with the force at rest, 0 ends it, none: toggle
+  stack,           // numbers: 1 the parts of the force as areas, 0 as lines, none: toggle
+  watch,           // text: name of a number of the tick, which is watched from now on, or no longer
   speed,           // numbers: simulated time over real time
   restart,         // starts the hand's path again
   edit,            // object, quantity, numbers: the value in SI
   change,          // change: of the scene, which is built again
+  difference,      // comparison: of two models over a surface, which it begins; without an object: ends it
   look_back,       // numbers: seconds before now; 0: the present
   go_on,           // the session goes on from the past that is shown
   arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
@@ -56,13 +59,16 @@ struct ViewAction {
   std::uint32_t object = Edit::kTool;
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
   SceneChange change{};
+  ModelComparison comparison{};
 };
 
 struct ViewState {
   ViewSettings view;
   bool panels = true;
   std::uint32_t selected = Edit::kTool;
-  bool moves = false;  // arrows on the selected object are shown
+  bool moves = false;                  // arrows on the selected object are shown
+  bool stacked = false;                // the chart of the force shows its parts as areas
+  std::vector<std::string> watched{};  // names of numbers (watched_numbers.h)
   // ---- requests to the session; the owner of the session takes counters and lists ----
   bool paused = false, compares_with_rest = false;
   double speed = 1.0;
@@ -71,6 +77,7 @@ struct ViewState {
   bool go_on = false;
   std::vector<Edit> edits{};
   std::vector<SceneChange> changes{};
+  std::optional<ModelComparison> comparison{};                     // to begin; without an object: to end
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look

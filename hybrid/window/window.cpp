@@ -424,6 +424,7 @@ WindowInput Window::take_input() {
           .asked = s.painter->asked(s.user.view),
           .edits = std::exchange(s.user.edits, {}),
           .changes = std::exchange(s.user.changes, {}),
+          .comparison = std::exchange(s.user.comparison, {}),
           .recording = std::exchange(s.user.recording, {}),
           .save_scene = std::exchange(s.user.save_scene, false),
           .reload = std::exchange(s.user.reload, false),

@@ -39,6 +39,7 @@ struct WindowInput {
   // ---- since the last call ----
   std::vector<Edit> edits;
   std::vector<SceneChange> changes;
+  std::optional<ModelComparison> comparison;       // as ViewState::comparison
   std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name
   bool save_scene = false, reload = false, go_on = false;
 };

@@ -20,10 +20,11 @@ enum class TissueColour : std::uint8_t {
   material,      // none
   displacement,  // from rest (m)
   strain,        // the principal strain of largest magnitude
-  limits         // difference along or across a link, as a share of the link's limit: the largest at a voxel
+  limits,        // difference along or across a link, as a share of the link's limit: the largest at a voxel
+  difference,    // felt between two models (Snapshot::difference) (JND)
 };
-inline constexpr std::array<std::string_view, 4> kTissueColours{"material", "displacement", "strain",
-                                                                "limits"};
+inline constexpr std::array<std::string_view, 5> kTissueColours{"material", "displacement", "strain",
+                                                                "limits", "difference"};
 [[nodiscard]] std::optional<TissueColour> tissue_colour_named(std::string_view name);
 
 // The voxels nearest to some places of an object, and the links of these voxels.

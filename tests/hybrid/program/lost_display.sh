@@ -17,7 +17,8 @@ fail() {
 
 # begin_session: a server with a free number, a session on it, and a wait until its window has shown pictures.
 begin_session() {
-  rm -f r.rec number seen.png view.log
+  rm -f r.rec seen.png view.log
+  : > number # before the server opens it
   Xvfb -displayfd 3 -screen 0 1300x1000x24 3> number > server.log 2>&1 &
   server=$!
   for ((n = 0; n < 300 && $(wc -c < number) == 0; ++n)); do sleep 0.1; done

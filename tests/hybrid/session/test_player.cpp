@@ -91,6 +91,25 @@ TEST_F(PlayerOf, ALiveSessionWithItsThreadsReplaysToTheSameState) {
   expect_replays();
 }
 
+TEST_F(PlayerOf, ThePartsOfTheForceAddUpToIt) {
+  player_->edit({0, Edit::kTool, max_force, 0.3});
+  steps(400);
+  steps(200, {.dragging = true, .goal_m = {8e-3, 0.0, 6e-3}});
+  hybrid::TickSample sample;
+  int in_contact = 0, limited = 0;
+  while (player_->samples().pop(sample)) {
+    float sum_N = 0.0F;
+    for (const float part_N : sample.along_N) sum_N += part_N;
+    // The limits shorten a force and may turn it a little.
+    EXPECT_NEAR(sum_N, sample.total_N, 0.02F + 0.02F * sample.total_N) << sample.t_s;
+    in_contact += sample.contacts != 0 ? 1 : 0;
+    limited += sample.along_N[static_cast<std::size_t>(hybrid::ForcePart::limits)] < -0.05F ? 1 : 0;
+    EXPECT_FLOAT_EQ(glm::length(sample.force_N), sample.total_N);
+  }
+  EXPECT_GT(in_contact, 200);
+  EXPECT_GT(limited, 0);
+}
+
 TEST_F(PlayerOf, MoreEditsThanFitAreRefusedAndCounted) {
   const std::size_t most = hybrid::Player::kEditsWaiting;
   for (std::size_t n = 0; n < most + 10; ++n)

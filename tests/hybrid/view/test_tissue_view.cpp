@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numbers>
 #include <thread>
 
@@ -113,6 +114,50 @@ TEST(TissueViewOf, ColoursSurfaceAndSlicesByStrain) {
   EXPECT_EQ(tissue.asked()->number, number);
   EXPECT_DOUBLE_EQ(tissue.scale().end, 1.0);
   EXPECT_NEAR(tissue.values(0)[0], 0.002F / 0.6F, 1e-4F);
+}
+
+TEST(TissueViewOf, ColoursTheSurfaceByADifferenceOfModels) {
+  tests::Session s = block();
+  const std::size_t count = s.scene.objects[0].surface.vertices.size();
+  hybrid::TissueView tissue(s.scene, glm::dvec3(0.0));
+  ViewSettings view;
+  view.colour = TissueColour::difference;
+  tissue.set(view);
+  tissue.take(s.now);
+  EXPECT_EQ(tissue.scale().end, 0.0) << "nothing is compared";
+  EXPECT_NE(tissue.in_words(), "");
+  hybrid::FeltDifference found{.comparison = 1, .number = 1, .jnd = std::vector<float>(count, 0.3F)};
+  found.jnd[0] = std::numeric_limits<float>::quiet_NaN();
+  s.now.difference = std::make_shared<hybrid::FeltDifference>(found);
+  tissue.take(s.now);
+  ASSERT_EQ(tissue.values(0).size(), count);
+  EXPECT_EQ(tissue.values(0)[0], 0.0F) << "not known";
+  EXPECT_EQ(tissue.values(0)[1], 0.3F);
+  EXPECT_EQ(tissue.scale().end, 1.0) << "nothing is felt";
+  EXPECT_EQ(tissue.in_words(), "");
+  const std::uint64_t number = tissue.values_number(0);
+  tissue.take(s.now);
+  EXPECT_EQ(tissue.values_number(0), number) << "the same result";
+  const auto show = [&](std::uint64_t comparison, float jnd) {
+    found.comparison = comparison;
+    ++found.number;
+    found.jnd.assign(count, jnd);
+    s.now.difference = std::make_shared<hybrid::FeltDifference>(found);
+    tissue.take(s.now);
+    return tissue.scale().end;
+  };
+  EXPECT_EQ(show(1, 4.0F), 5.0);
+  EXPECT_EQ(show(1, 2.0F), 5.0) << "a scale does not fall within a comparison";
+  EXPECT_EQ(show(2, 1.5F), 2.0);
+  view.colour = TissueColour::displacement;
+  tissue.set(view);
+  EXPECT_TRUE(tissue.values(0).empty()) << "displacements again";
+  s.now.difference.reset();
+  view.colour = TissueColour::difference;
+  tissue.set(view);
+  tissue.take(s.now);
+  EXPECT_EQ(tissue.values(0)[1], 0.0F);
+  EXPECT_EQ(tissue.scale().end, 0.0);
 }
 
 TEST(SliceFrames, AreGrabbedAtTheirHandleAndFollowThePointer) {

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hybrid/window/watched_numbers.h"
+
 namespace {
 
 using hybrid::ForceSeries;
@@ -71,6 +73,51 @@ TEST(TickHistory, EveryPartHasItsSeries) {
     EXPECT_EQ(most_in(history, series, 10), static_cast<float>(s + 1));
   }
   EXPECT_EQ(history.most_N(), 7.0);
+}
+
+TEST(TickHistory, PartsAreThoseOfTheTickWithTheLargestForce) {
+  hybrid::TickHistory history(5.0);
+  for (int tick = 0; tick < 1000; ++tick) {
+    hybrid::TickSample one = sample(tick, tick == 500 ? 4.0F : 1.0F);
+    one.along_N = {0.75F * one.total_N, 0.5F * one.total_N, 0.0F, 0.0F, -0.25F * one.total_N, 0.0F};
+    history.add(one);
+  }
+  for (const std::size_t count : {std::size_t{1}, std::size_t{37}, std::size_t{5000}}) {
+    std::size_t spikes = 0, seen = 0;
+    for (const auto& parts : history.parts(count)) {
+      if (!parts) continue;
+      ++seen;
+      float sum = 0.0F;
+      for (const float part : *parts) sum += part;
+      spikes += sum == 4.0F ? 1 : 0;
+      EXPECT_TRUE(sum == 1.0F || sum == 4.0F);
+    }
+    EXPECT_EQ(spikes, 1U) << count;
+    EXPECT_GT(seen, 0U);
+  }
+}
+
+TEST(TickHistory, EveryNumberOfATickHasItsRange) {
+  hybrid::TickHistory history(5.0);
+  const hybrid::WatchedNumber* const force = hybrid::watched_number_named("force");
+  const hybrid::WatchedNumber* const apart = hybrid::watched_number_named("device to proxy");
+  ASSERT_TRUE(force != nullptr && apart != nullptr);
+  EXPECT_EQ(hybrid::watched_number_named("farce"), nullptr);
+  EXPECT_FALSE(history.range(force->of));
+  for (int tick = 0; tick < 100; ++tick) {
+    hybrid::TickSample one = sample(tick, tick == 50 ? 6.0F : 1.0F);
+    one.device_m = {0.0, 0.0, -1e-5 * tick};
+    history.add(one);
+  }
+  EXPECT_EQ(history.range(force->of)->most, 6.0);
+  EXPECT_EQ(history.range(force->of)->now, 1.0);
+  EXPECT_EQ(apart->unit, "mm");
+  EXPECT_NEAR(history.range(apart->of)->now, 0.99, 1e-9);
+  EXPECT_EQ(history.range(apart->of)->least, 0.0);
+  for (const hybrid::WatchedNumber& number : hybrid::watched_numbers()) {
+    EXPECT_TRUE(history.range(number.of)) << number.name;
+    EXPECT_EQ(hybrid::watched_number_named(number.name), &number) << "names differ";
+  }
 }
 
 TEST(TickHistory, AFullRingRefusesAndCountsAndDoesNotWait) {

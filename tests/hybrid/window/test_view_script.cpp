@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "hybrid/window/panel_words.h"
 #include "hybrid/window/window_keys.h"
 
 namespace {
@@ -202,6 +203,78 @@ TEST(ViewScript, ChangesOfTheSceneNameObjectsAndMaterials) {
                                 "0 spacing \"left lung\" 0", "0 move bone 1 2", "0 energy \"left lung\""}) {
     EXPECT_THROW(ViewScript(bad, "tour.txt", scene), std::runtime_error) << bad;
   }
+}
+
+TEST(ViewScript, ComparesTwoModels) {
+  using Key = hybrid::SceneChange::Key;
+  hybrid::DrawnScene scene = drawn();
+  scene.objects[1].choices.tissue = true;
+  ViewScript script(
+      "0 difference \"left lung\" as-is trilinear+4.5 3\n1 difference \"left lung\" six-link rigid 2.5 40\n"
+      "2 difference off\n",
+      "tour.txt", scene);
+  hybrid::ViewState state;
+  const auto play_to = [&](double t_s) {
+    for (const auto& action : script.due(t_s)) hybrid::act(state, action);
+    return state.comparison.value_or(hybrid::ModelComparison{.object = "none"});
+  };
+  hybrid::ModelComparison asked = play_to(0.0);
+  EXPECT_EQ(state.view.colour, hybrid::TissueColour::difference);
+  EXPECT_EQ(asked.object, "left lung");
+  EXPECT_TRUE(asked.a.empty());
+  ASSERT_EQ(asked.b.size(), 2U);
+  EXPECT_EQ(asked.b[0].key, Key::energy);
+  EXPECT_EQ(asked.b[0].value.x, 1.0);
+  EXPECT_EQ(asked.b[1].key, Key::spacing);
+  EXPECT_DOUBLE_EQ(asked.b[1].value.x, 4.5e-3);
+  EXPECT_DOUBLE_EQ(asked.depth_m, 3e-3);
+  EXPECT_GT(asked.places, 100U);
+  asked = play_to(1.0);
+  ASSERT_EQ(asked.a.size(), 1U);
+  EXPECT_EQ(asked.a[0].value.x, 0.0);
+  EXPECT_EQ(asked.b[0].key, Key::model);
+  EXPECT_EQ(asked.places, 40U);
+  EXPECT_EQ(play_to(2.0).object, "") << "the comparison ends";
+  EXPECT_EQ(state.view.colour, hybrid::TissueColour::difference) << "its result stays";
+  for (const std::string bad :
+       {"0 difference bone as-is rigid 3", "0 difference \"left lung\" as-is jelly 3",
+        "0 difference \"left lung\" as-is trilinear+ 3", "0 difference \"left lung\" as-is rigid 0",
+        "0 difference \"left lung\" as-is", "0 difference", "0 difference \"left lung\" as-is rigid 3 0"}) {
+    EXPECT_NE(refusal_of_script(bad), "") << bad;
+    EXPECT_THROW(ViewScript(bad, "tour.txt", scene), std::runtime_error) << bad;
+  }
+}
+
+TEST(ViewScript, WatchesNumbersAndStacksTheForce) {
+  ViewScript script("0 watch \"device x\"\n0 watch tick\n0 stack on\n1 watch \"device x\"\n", "tour.txt",
+                    drawn());
+  hybrid::ViewState state;
+  for (const auto& action : script.due(0.0)) hybrid::act(state, action);
+  EXPECT_EQ(state.watched, (std::vector<std::string>{"device x", "tick"}));
+  EXPECT_TRUE(state.stacked);
+  for (const auto& action : script.due(1.0)) hybrid::act(state, action);
+  EXPECT_EQ(state.watched, (std::vector<std::string>{"tick"})) << "no longer";
+  EXPECT_NE(refusal_of_script("0 watch tock").find("it has "), std::string::npos);
+}
+
+TEST(ModelOptions, OfferWhatAnObjectAllows) {
+  hybrid::DrawnObject lung;
+  lung.name = "lung";
+  lung.choices = {.tissue = true,
+                  .other_model = true,
+                  .other_energy = true,
+                  .spacing_m = 2e-3,
+                  .spacing_words = "2 mm",
+                  .spacings = {{1e-3, "1 mm"}, {4e-3, "4 mm"}}};
+  const auto words = [](const hybrid::DrawnObject& object) {
+    std::string all;
+    for (const hybrid::ModelOption& option : hybrid::model_options(object)) all += option.words + "; ";
+    return all;
+  };
+  EXPECT_EQ(words(lung), "as it is: six-link, 2 mm; trilinear; 1 mm; 4 mm; as rigid; ");
+  EXPECT_EQ(hybrid::model_options(lung)[1].changes[0].name, "lung");
+  lung.choices.other_energy = lung.choices.other_model = false;
+  EXPECT_EQ(words(lung), "as it is: six-link, 2 mm; 1 mm; 4 mm; ");
 }
 
 TEST(ViewState, LooksAndSelectionGoWithTheObjectsName) {

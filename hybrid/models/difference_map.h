@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where on an object's surface does a hand tell two models apart? The tool is pressed in at many places by
+// the same depth in both, and the forces at rest are compared.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "hybrid/build/build_world.h"
+#include "hybrid/models/surface_places.h"
+#include "hybrid/snapshot/snapshot.h"
+
+namespace hybrid {
+
+// Why two models cannot be compared at rest, in words; empty: they can.
+[[nodiscard]] std::string why_no_difference_map(const World& a, const World& b);
+
+class DifferenceMap {
+ public:
+  // The place of the pressed tool relates to `surface`, which need not be that of `a` or `b`. Both must be at
+  // rest. `depth_m`: of the tool below the surface. `floor_N`: lower bound of the JND, whose reference is
+  // `a`. Keeps references to both scenes.
+  DifferenceMap(const polygon::TriangleMesh& surface, const BuiltScene& a, const BuiltScene& b,
+                double depth_m, double floor_N);
+
+  // Presses at so many more places, on `threads` threads of the caller's priority. Places are the same for
+  // any number of threads, and so are forces. False: the surface is covered, or `stop` became true; places
+  // that it left out are not known.
+  bool press(std::size_t places, std::size_t threads, const std::atomic<bool>& stop);
+
+  // The result so far, without `object`, `comparison` and `number`.
+  [[nodiscard]] FeltDifference now() const;
+  [[nodiscard]] std::size_t places() const { return places_.given(); }
+
+ private:
+  struct Pressed {
+    SurfacePlace at;
+    bool known = false;  // the tool can come there in both models
+    double jnd = 0.0, a_N = 0.0, b_N = 0.0;
+  };
+  void press_at(Pressed& place, const std::atomic<bool>& stop) const;
+
+  const BuiltScene &a_, &b_;
+  SurfacePlaces places_;
+  double depth_m_, floor_N_, radius_m_;
+  double gap_m_;       // between places on a covered surface
+  double most_way_m_;  // from the start of the tool to a free place
+  std::vector<Pressed> pressed_;
+};
+
+}  // namespace hybrid
