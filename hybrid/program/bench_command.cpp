@@ -15,7 +15,7 @@
 #include "hybrid/bench/soft.h"
 #include "hybrid/bench/threads.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {

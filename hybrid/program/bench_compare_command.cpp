@@ -7,7 +7,7 @@
 #include "hybrid/bench/reports/compare_reports.h"
 #include "hybrid/bench/reports/read_reports.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {

@@ -11,8 +11,8 @@
 #include "hybrid/plot/scenes_plot.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/compare_page.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {

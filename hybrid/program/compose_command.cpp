@@ -8,8 +8,8 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/table.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/scene/table_reader.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {

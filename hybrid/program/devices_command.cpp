@@ -10,7 +10,7 @@
 #include "device/phantom/phantom.h"
 #include "device/simulated/simulated.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 
 namespace hybrid {

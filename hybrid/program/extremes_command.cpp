@@ -7,7 +7,7 @@
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/stress/extremes.h"
 #include "hybrid/stress/fuzz_ticks.h"

@@ -20,9 +20,9 @@
 #include "hybrid/program/commands.h"
 #include "hybrid/program/help/did_you_mean.h"
 #include "hybrid/program/help/program_pages.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/scene/table_reader.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/real_device.h"
 
 namespace {

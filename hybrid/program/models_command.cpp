@@ -12,8 +12,8 @@
 #include "hybrid/models/variants.h"
 #include "hybrid/program/commands.h"
 #include "hybrid/program/models_page.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/tune/edit_scene.h"
 

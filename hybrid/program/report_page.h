@@ -7,7 +7,7 @@
 
 #include "hybrid/page/page.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
+#include "hybrid/session/outputs.h"
 
 namespace hybrid {
 

@@ -7,9 +7,9 @@
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/program/stability_page.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/stability/plot.h"
 #include "hybrid/stability/stability.h"

@@ -10,8 +10,8 @@
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/study/study_report.h"
 

@@ -7,8 +7,8 @@
 
 #include "hybrid/base/whole_file.h"
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/tune/edit_scene.h"
 #include "hybrid/tune/tune_page.h"

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/report_page.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 #include "hybrid/validate/table.h"
 #include "hybrid/validate/validate.h"

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "hybrid/program/commands.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/view_steps.h"
 #include "hybrid/program/viewed_scene.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/window/glfw_library.h"
 #include "hybrid/window/video.h"

@@ -9,7 +9,7 @@
 #include "hybrid/base/file_ending.h"
 #include "hybrid/base/png_file.h"
 #include "hybrid/base/whole_file.h"
-#include "hybrid/program/outputs.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/session/scene_text.h"
 
 namespace hybrid {

@@ -7,9 +7,9 @@
 
 #include "device/loop/stop_signal.h"
 #include "hybrid/base/thread_time.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
 #include "hybrid/program/view_steps.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/window/frame_meter.h"
 #include "hybrid/window/video.h"
 

@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "device/loop/stop_signal.h"
-#include "hybrid/program/outputs.h"
 #include "hybrid/program/view_files.h"
 #include "hybrid/program/view_steps.h"
 #include "hybrid/session/live_session.h"
+#include "hybrid/session/outputs.h"
 #include "hybrid/window/frame_meter.h"
 
 namespace hybrid {

@@ -8,8 +8,8 @@
 #include <glm/geometric.hpp>
 
 #include "hybrid/feel/just_noticeable.h"
-#include "hybrid/session/equilibrium.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
+#include "tests/hybrid/fixtures/equilibrium.h"
 #include "tests/hybrid/fixtures/touch.h"
 
 namespace {
@@ -40,7 +40,7 @@ class HalfChanged : public tests::SceneFile {
   static glm::dvec3 pressed(const hybrid::Scene& scene, const glm::dvec3& at_m, const glm::dvec3& outward) {
     tests::Touch touch(scene, at_m + 2.0 * kRadius_m * outward);
     touch.go(at_m + (kRadius_m - kDepth_m) * outward, 1e-4, 50);
-    const auto force = hybrid::equilibrium_force(touch.world(), touch.state());
+    const auto force = tests::equilibrium_force(touch.world(), touch.state());
     return force.value_or(glm::dvec3(NAN));
   }
 };
