@@ -16,22 +16,19 @@ fail() {
 # Far longer than it takes until the signal comes.
 session=("$program" run "$scenes/cube.toml" --seconds 2000 --samples 0 --trace t.csv --record r.rec --json j.json)
 
-# stopped SIGNAL STATUS WORDS WHEN COMMAND…: the signal comes once WHEN was said, or after five seconds where that is
-# empty.
+# stopped SIGNAL STATUS WORDS WHEN COMMAND…: the signal comes settle_s after WHEN was said.
+settle_s=0
 stopped() {
   local signal=$1 wanted=$2 words=$3 when=$4 process status n
   shift 4
   rm -f t.csv r.rec j.json
   "$@" > run.log 2>&1 &
   process=$!
-  if [ -z "$when" ]; then
-    sleep 5
-  else
-    for ((n = 0; n < 600; ++n)); do
-      grep -q "$when" run.log && break
-      sleep 0.1
-    done
-  fi
+  for ((n = 0; n < 600; ++n)); do
+    grep -q "$when" run.log && break
+    sleep 0.1
+  done
+  sleep "$settle_s"
   kill "-$signal" "$process"
   wait "$process"
   status=$?
@@ -40,8 +37,9 @@ stopped() {
 }
 
 for mode in "" --realtime; do
-  when="tick [0-9]"
-  [ -z "$mode" ] || when="" # says nothing while it runs
+  when="tick [0-9]" settle_s=0
+  # In real time it says nothing while it runs; notes come while the scene is built, soon before the first tick.
+  [ -z "$mode" ] || when="note: block" settle_s=6
   for signal in INT TERM; do
     status=130 name=Ctrl-C
     [ $signal = TERM ] && status=143 name=SIGTERM
@@ -77,6 +75,7 @@ status=$?
 [ "$status" = 130 ] || fail "a video, INT: status $status, not 130"
 [ -s v.mkv ] || fail "the video was lost: $(tail -n 3 run.log)"
 
+settle_s=0
 # A study keeps the rows that are done. It must take far longer than until its first words.
 stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "^slide" \
   "$program" bench rigid --only slide --meshes ico2,ico3,ico5,ico6,ico7 --json j.json
