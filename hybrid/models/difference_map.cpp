@@ -25,6 +25,15 @@ double widest_spacing_m(const BuiltScene& built) {
   return widest;
 }
 
+bool is_soft(const BuiltScene& built, const std::string& object) {
+  return std::ranges::any_of(built.world->soft, [&](const SoftBody& body) { return body.name == object; });
+}
+
+// A force without tissue comes from something rigid that lies over it.
+bool is_blocked(const RestForce& rest) {
+  return !rest.tissue && glm::length(rest.force_N) > 0.0;
+}
+
 }  // namespace
 
 std::string why_no_difference_map(const World& a, const World& b) {
@@ -32,25 +41,27 @@ std::string why_no_difference_map(const World& a, const World& b) {
 }
 
 // A tool that is a point has the size of a voxel here.
-DifferenceMap::DifferenceMap(const polygon::TriangleMesh& surface, const BuiltScene& a, const BuiltScene& b,
-                             double depth_m, double floor_N)
+DifferenceMap::DifferenceMap(const std::string& object, const polygon::TriangleMesh& surface,
+                             const BuiltScene& a, const BuiltScene& b, double depth_m, double floor_N)
     : a_(a),
       b_(b),
+      a_soft_(is_soft(a, object)),
+      b_soft_(is_soft(b, object)),
       places_(surface, std::max({a.world->tool.radius_m, widest_spacing_m(a), widest_spacing_m(b)})),
       depth_m_(depth_m),
       floor_N_(floor_N),
       radius_m_(a.world->tool.radius_m),
       gap_m_(kCovered * std::max({radius_m_, widest_spacing_m(a), widest_spacing_m(b)})),
-      most_way_m_(radius_m_ + std::max(widest_spacing_m(a), widest_spacing_m(b))) {}
+      most_way_m_(std::max({kAway * radius_m_, widest_spacing_m(a), widest_spacing_m(b)})) {}
 
 // Voxels may reach beyond the surface, so the tool may have to start a little further out.
 void DifferenceMap::press_at(Pressed& place, const std::atomic<bool>& stop) const {
   const glm::dvec3 device_m = place.at.at_m + (radius_m_ - depth_m_) * place.at.outward;
   const glm::dvec3 outside_m = place.at.at_m + (1.0 + kAway) * radius_m_ * place.at.outward;
   const auto a = press_to_rest(*a_.world, *a_.state, device_m, outside_m, most_way_m_, stop);
-  if (!a) return;
+  if (!a || (a_soft_ && is_blocked(*a))) return;
   const auto b = press_to_rest(*b_.world, *b_.state, device_m, outside_m, most_way_m_, stop);
-  if (!b || stop.load(std::memory_order_relaxed)) return;
+  if (!b || (b_soft_ && is_blocked(*b)) || stop.load(std::memory_order_relaxed)) return;
   place.known = true;
   place.jnd = jnd_of(b->force_N, a->force_N, floor_N_);
   place.a_N = glm::length(a->force_N);

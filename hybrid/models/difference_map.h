@@ -19,11 +19,11 @@ namespace hybrid {
 
 class DifferenceMap {
  public:
-  // The place of the pressed tool relates to `surface`, which need not be that of `a` or `b`. Both must be at
+  // The tool is pressed into `surface`, that of `object`, which need not be as in `a` or `b`. Both must be at
   // rest. `depth_m`: of the tool below the surface. `floor_N`: lower bound of the JND, whose reference is
   // `a`. Keeps references to both scenes.
-  DifferenceMap(const polygon::TriangleMesh& surface, const BuiltScene& a, const BuiltScene& b,
-                double depth_m, double floor_N);
+  DifferenceMap(const std::string& object, const polygon::TriangleMesh& surface, const BuiltScene& a,
+                const BuiltScene& b, double depth_m, double floor_N);
 
   // Presses at so many more places, on `threads` threads of the caller's priority. Places are the same for
   // any number of threads, and so are forces. False: the surface is covered, or `stop` became true; places
@@ -43,6 +43,7 @@ class DifferenceMap {
   void press_at(Pressed& place, const std::atomic<bool>& stop) const;
 
   const BuiltScene &a_, &b_;
+  bool a_soft_, b_soft_;  // the object is felt by its voxels
   SurfacePlaces places_;
   double depth_m_, floor_N_, radius_m_;
   double gap_m_;       // between places on a covered surface

@@ -113,7 +113,7 @@ void ModelDifference::run(const Job& job) {
   }
   const std::size_t threads =
       std::clamp<std::size_t>(std::thread::hardware_concurrency() / 2, 1, kMostThreads);
-  DifferenceMap map(job.surface, a, b, job.comparison.depth_m, job.floor_N);
+  DifferenceMap map(job.comparison.object, job.surface, a, b, job.comparison.depth_m, job.floor_N);
   const std::size_t most = job.comparison.places;
   std::size_t more = 2 * threads;
   for (bool goes_on = true; goes_on;) {

@@ -58,6 +58,8 @@ RestForce stand_still(const World& world, WorldState& state, int most_ticks, con
     rest.steady = glm::length(now - rest.force_N) <= std::max(kSteady_N, kSteadyShare * glm::length(now));
     rest.force_N = now;
   }
+  rest.tissue =
+      std::ranges::any_of(state.reactions, [](const auto& reaction) { return reaction.pressed > 0; });
   return rest;
 }
 
@@ -94,7 +96,7 @@ bool take_over(const World& before_world, const WorldState& before, const World&
 }
 
 RestForce force_at_rest(const World& world, const WorldState& state, const std::atomic<bool>& stop) {
-  if (state.proxy_m == state.device_m) return {glm::dvec3(0.0), true};  // nothing is touched
+  if (state.proxy_m == state.device_m) return {.steady = true};  // nothing is touched
   const std::unique_ptr<WorldState> copy = copy_state(world, state);
   return stand_still(world, *copy, kMostResting, stop);
 }

@@ -28,6 +28,7 @@ namespace hybrid {
 struct RestForce {
   glm::dvec3 force_N{0.0};
   bool steady = false;  // false: it still changed by more than 0.2 % in a tenth of a second
+  bool tissue = false;  // the tool presses tissue
 };
 // Any thread may call it while the state stays as it is. Ends early, with a force that is not steady, once
 // `stop` is true.

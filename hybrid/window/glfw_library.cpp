@@ -6,12 +6,36 @@
 
 #include <dlfcn.h>
 
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <stdexcept>
 
+#include "hybrid/window/ui_input.h"
+
 namespace hybrid {
 namespace {
+
+constexpr auto ui = [](UiKey key) { return static_cast<int>(key); };
+constexpr std::array<NamedKey, 19> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::tab)},
+                                               {"left", GLFW_KEY_LEFT, ui(UiKey::left)},
+                                               {"right", GLFW_KEY_RIGHT, ui(UiKey::right)},
+                                               {"up", GLFW_KEY_UP, ui(UiKey::up)},
+                                               {"down", GLFW_KEY_DOWN, ui(UiKey::down)},
+                                               {"pageup", GLFW_KEY_PAGE_UP, ui(UiKey::page_up)},
+                                               {"pagedown", GLFW_KEY_PAGE_DOWN, ui(UiKey::page_down)},
+                                               {"home", GLFW_KEY_HOME, ui(UiKey::home)},
+                                               {"end", GLFW_KEY_END, ui(UiKey::end)},
+                                               {"insert", GLFW_KEY_INSERT, ui(UiKey::insert)},
+                                               {"delete", GLFW_KEY_DELETE, ui(UiKey::erase)},
+                                               {"backspace", GLFW_KEY_BACKSPACE, ui(UiKey::backspace)},
+                                               {"space", GLFW_KEY_SPACE, ui(UiKey::space)},
+                                               {"enter", GLFW_KEY_ENTER, ui(UiKey::enter)},
+                                               {"escape", GLFW_KEY_ESCAPE, ui(UiKey::escape)},
+                                               {"[", GLFW_KEY_LEFT_BRACKET, -1},
+                                               {"]", GLFW_KEY_RIGHT_BRACKET, -1},
+                                               {",", GLFW_KEY_COMMA, -1},
+                                               {".", GLFW_KEY_PERIOD, -1}}};
 
 std::atomic<bool> request_refused{false}, connection_broken{false};
 
@@ -57,6 +81,10 @@ std::string why_window_is_lost() {
 
 bool display_is_gone() {
   return connection_broken;
+}
+
+std::span<const NamedKey> named_keys() {
+  return kNamedKeys;
 }
 
 std::string glfw_reason() {

@@ -2,7 +2,9 @@
 // The library of windows, which runs as long as a window exists.
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
 
 namespace hybrid {
 
@@ -13,6 +15,14 @@ std::string glfw_reason();
 std::string why_window_is_lost();
 // Is the connection to the display broken? Then even closing the window would wait for an answer.
 bool display_is_gone();
+
+// A key with a name, as the library knows it and as the panel does.
+struct NamedKey {
+  std::string_view name;
+  int glfw;
+  int ui;  // UiKey, or -1
+};
+std::span<const NamedKey> named_keys();
 
 struct GlfwLibrary {
   // Throws std::runtime_error with the remedy if there is no display.

@@ -34,33 +34,9 @@ enum class Drag { none, orbit, pan, tool, slice, object };
 
 constexpr int kMostPixels = 8192;        // most pixels along a side of a frame
 constexpr double kIdle_s = 1.0 / 120.0;  // wait for input after a frame in which nothing changed
-constexpr float kSlowest_s = 0.25F;      // longest time between frames that the panel gets
+constexpr double kDepthStep = 0.01;  // of the dragged tool, for a turn of the wheel (unit: the view's height)
+constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets
 
-struct NamedKey {
-  std::string_view name;
-  int glfw;
-  int ui;  // UiKey, or -1
-};
-constexpr auto ui = [](UiKey key) { return static_cast<int>(key); };
-constexpr std::array<NamedKey, 19> kNamedKeys{{{"tab", GLFW_KEY_TAB, ui(UiKey::tab)},
-                                               {"left", GLFW_KEY_LEFT, ui(UiKey::left)},
-                                               {"right", GLFW_KEY_RIGHT, ui(UiKey::right)},
-                                               {"up", GLFW_KEY_UP, ui(UiKey::up)},
-                                               {"down", GLFW_KEY_DOWN, ui(UiKey::down)},
-                                               {"pageup", GLFW_KEY_PAGE_UP, ui(UiKey::page_up)},
-                                               {"pagedown", GLFW_KEY_PAGE_DOWN, ui(UiKey::page_down)},
-                                               {"home", GLFW_KEY_HOME, ui(UiKey::home)},
-                                               {"end", GLFW_KEY_END, ui(UiKey::end)},
-                                               {"insert", GLFW_KEY_INSERT, ui(UiKey::insert)},
-                                               {"delete", GLFW_KEY_DELETE, ui(UiKey::erase)},
-                                               {"backspace", GLFW_KEY_BACKSPACE, ui(UiKey::backspace)},
-                                               {"space", GLFW_KEY_SPACE, ui(UiKey::space)},
-                                               {"enter", GLFW_KEY_ENTER, ui(UiKey::enter)},
-                                               {"escape", GLFW_KEY_ESCAPE, ui(UiKey::escape)},
-                                               {"[", GLFW_KEY_LEFT_BRACKET, -1},
-                                               {"]", GLFW_KEY_RIGHT_BRACKET, -1},
-                                               {",", GLFW_KEY_COMMA, -1},
-                                               {".", GLFW_KEY_PERIOD, -1}}};
 constexpr std::array<std::pair<char, UiKey>, 6> kLetters{
     {{'a', UiKey::a}, {'c', UiKey::c}, {'v', UiKey::v}, {'x', UiKey::x}, {'y', UiKey::y}, {'z', UiKey::z}}};
 
@@ -204,6 +180,13 @@ struct Window::State {
       input.wheel += static_cast<float>(turns);
       return;
     }
+    if (drag == Drag::tool) {  // the tool moves away from the eye, and the drag's plane with it
+      const glm::dvec3 by_m = -kDepthStep * turns * camera.view_height_m() * camera.toward_eye();
+      drag_plane_m += by_m;
+      goal_m = *goal_m + by_m;
+      grip_m = *goal_m - under_pointer();
+      return;
+    }
     camera.distance_m *= std::exp(-0.12 * std::clamp(turns, -10.0, 10.0));
     camera.distance_m = std::clamp(camera.distance_m, 1e-9, 1e9);
   }
@@ -212,7 +195,7 @@ struct Window::State {
   // keyboard's focus.
   void key(std::string_view name, bool pressed) {
     bool for_panel = false;
-    for (const NamedKey& k : kNamedKeys) {
+    for (const NamedKey& k : named_keys()) {
       if (k.name != name || k.ui < 0) continue;
       for_panel = input.by_keyboard || wants_text;
       input.press_key(static_cast<UiKey>(k.ui), pressed && for_panel);
@@ -235,7 +218,7 @@ struct Window::State {
     input.shift = (mods & GLFW_MOD_SHIFT) != 0;
     input.alt = (mods & GLFW_MOD_ALT) != 0;
     if (action == GLFW_REPEAT) return;
-    for (const NamedKey& k : kNamedKeys) {
+    for (const NamedKey& k : named_keys()) {
       if (k.glfw == which) key(k.name, action == GLFW_PRESS);
     }
     const bool letter = which >= GLFW_KEY_A && which <= GLFW_KEY_Z;

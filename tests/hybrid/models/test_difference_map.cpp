@@ -49,7 +49,7 @@ TEST_F(HalfChanged, IsFeltOnThatHalfAlone) {
   const hybrid::Scene soft = scene(8000.0), stiff = scene(24000.0);
   const auto a = hybrid::build_scene(soft), b = hybrid::build_scene(stiff);
   const polygon::TriangleMesh surface = surface_of(soft, a);
-  DifferenceMap map(surface, a, b, kDepth_m, hybrid::kJndFloor_N);
+  DifferenceMap map("block", surface, a, b, kDepth_m, hybrid::kJndFloor_N);
   ASSERT_TRUE(map.press(160, 2, kGoOn));
   const FeltDifference found = map.now();
   EXPECT_EQ(found.places, 160U);
@@ -95,8 +95,8 @@ TEST_F(HalfChanged, IsTheSameForAnyNumberOfThreads) {
   const hybrid::Scene soft = scene(8000.0), other = scene(8000.0, "energy = \"trilinear\"\n");
   const auto a = hybrid::build_scene(soft), b = hybrid::build_scene(other);
   const polygon::TriangleMesh surface = surface_of(soft, a);
-  DifferenceMap one(surface, a, b, kDepth_m, hybrid::kJndFloor_N),
-      three(surface, a, b, kDepth_m, hybrid::kJndFloor_N);
+  DifferenceMap one("block", surface, a, b, kDepth_m, hybrid::kJndFloor_N),
+      three("block", surface, a, b, kDepth_m, hybrid::kJndFloor_N);
   ASSERT_TRUE(one.press(12, 1, kGoOn));
   ASSERT_TRUE(three.press(5, 3, kGoOn));
   ASSERT_TRUE(three.press(7, 3, kGoOn));
@@ -118,7 +118,7 @@ TEST_F(HalfChanged, IsNothingForOneModelAndUnknownWhereTheToolCannotCome) {
   const auto a = hybrid::build_scene(covered), b = hybrid::build_scene(covered);
   const auto drawn = hybrid::drawn_scene(covered, a, "block");
   const polygon::TriangleMesh& surface = drawn.objects[1].surface;
-  DifferenceMap map(surface, a, b, kDepth_m, hybrid::kJndFloor_N);
+  DifferenceMap map("block", surface, a, b, kDepth_m, hybrid::kJndFloor_N);
   ASSERT_TRUE(map.press(60, 2, kGoOn));
   const FeltDifference found = map.now();
   EXPECT_LT(found.pressed, found.places);
@@ -136,12 +136,34 @@ TEST_F(HalfChanged, IsNothingForOneModelAndUnknownWhereTheToolCannotCome) {
   }
 }
 
+TEST_F(HalfChanged, IsUnknownUnderSomethingThinAndKnownForATissueThatIsRigid) {
+  const std::string sheet =
+      "[[rigid]]\nname = \"sheet\"\nprimitive = \"box\"\nsize = [32, 60, 0.5]\nposition = [-16, 0, 5.5]\n";
+  const hybrid::Scene covered = scene(8000.0, {}, sheet), rigid = scene(8000.0, "model = \"proxy\"\n", sheet);
+  const auto a = hybrid::build_scene(covered), b = hybrid::build_scene(rigid);
+  const auto drawn = hybrid::drawn_scene(covered, a, "block");
+  const polygon::TriangleMesh& surface = drawn.objects[1].surface;
+  DifferenceMap map("block", surface, a, b, kDepth_m, hybrid::kJndFloor_N);
+  ASSERT_TRUE(map.press(60, 2, kGoOn));
+  const FeltDifference found = map.now();
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
+    const glm::dvec3& at = surface.vertices[v];
+    if (std::abs(at.y) > 6e-3 || at.z < 4.5e-3) continue;
+    if (at.x < -12e-3 && at.x > -24e-3) {
+      EXPECT_TRUE(std::isnan(found.jnd[v])) << at.x;
+    }
+    if (at.x > 12e-3 && at.x < 24e-3) {
+      EXPECT_GT(found.jnd[v], 1.0F) << at.x;
+    }
+  }
+}
+
 TEST_F(HalfChanged, EndsWhenTheSurfaceIsCoveredOrWhenItIsStopped) {
   const hybrid::Scene soft = scene(8000.0);
   const auto a = hybrid::build_scene(soft);
   const polygon::TriangleMesh surface = surface_of(soft, a);
   const std::atomic<bool> stopped{true};
-  DifferenceMap map(surface, a, a, kDepth_m, hybrid::kJndFloor_N);
+  DifferenceMap map("block", surface, a, a, kDepth_m, hybrid::kJndFloor_N);
   EXPECT_FALSE(map.press(1'000'000, 1, stopped)) << "no place is left out, and none pressed";
   EXPECT_EQ(map.now().pressed, 0U);
   EXPECT_LE(map.now().gap_m, 0.25 * kRadius_m);

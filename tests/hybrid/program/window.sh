@@ -81,6 +81,7 @@ visit() {
   sleep "$pause_s"
 
   drag 3 400 450 420 560           # 1 the tool is pulled, into contact where something is below it
+  xdotool click --repeat 4 4 click 5 # and in depth
   keys c v                         # 2 a view of the contact, 3 slices
   drag 1 300 300 360 340           # 4 the view turns
   xdotool mouseup 1 click 4 click 5
