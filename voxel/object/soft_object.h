@@ -103,7 +103,8 @@ class SoftObject {
   // still. Call use_composite_grid() before obstacles are set. If the object is unsuitable, returns the
   // reason and changes nothing. Returns an empty string if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
-  std::string use_composite_grid(const ToolInBody& tool);
+  // `margin`: voxels of the finest patch beyond the contact, on each side. A wide tool has less.
+  std::string use_composite_grid(const ToolInBody& tool, int margin = 6);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
   // Largest relative force error in trials of use_composite_grid(), against patches twice as wide.
   [[nodiscard]] double patch_error() const { return patch_error_; }
@@ -127,8 +128,13 @@ class SoftObject {
   // Share (0 to 1) of the counted work that a tick may spend on its contact under asynchronous relaxation;
   // less than 1 for a slow machine. Later ticks do the remaining work.
   void set_work_share(double share) noexcept {
-    work_share_ = share;
-    relaxation_.set_small_patch_share(share);
+    work_share_ = own_work_share_ * share;
+    relaxation_.set_small_patch_share(work_share_);
+  }
+  // The share on any machine. On nested patches a share below 1 bounds the axes that a tick relaxes.
+  void set_own_work_share(double share) noexcept {
+    own_work_share_ = share;
+    set_work_share(1.0);
   }
   [[nodiscard]] double work_share() const { return work_share_; }
   // Counted work (see Relaxation) that remains for this tick.
@@ -368,6 +374,7 @@ class SoftObject {
   void press_on_grid(const ToolInBody& tool) noexcept;
   void settle_on_grid(const ToolInBody& tool) noexcept;
   [[nodiscard]] std::array<bool, 3> axes_due() noexcept;
+  [[nodiscard]] std::array<bool, 3> fewer_axes_due() noexcept;
   [[nodiscard]] double depth_on_grid() const noexcept;
   [[nodiscard]] Reaction reaction_on_grid(const ToolInBody& tool) const noexcept;
   [[nodiscard]] bool at_anchors_end(VoxelId v, const glm::dvec3& direction) const noexcept;
@@ -422,7 +429,7 @@ class SoftObject {
   std::size_t contact_work_ = 0;             // counted work of contact cycles since touch() …
   int cycles_since_touch_ = 0;               // … and their number
   int cold_ticks_ = 0;  // ticks for which the contact's neighbourhood is not in the caches yet
-  double work_share_ = 1.0;
+  double own_work_share_ = 1.0, work_share_ = 1.0;
   bool split_cycle_ = false;  // a cycle around a large patch ran, or a part of one
   bool skip_requested_ = false;
   bool skips_cycle_ = false;  // no contact cycle begins in this tick unless the tool jumps
@@ -442,6 +449,7 @@ class SoftObject {
   std::vector<TouchOnGrid> touches_on_grid_;
   std::array<int, 3> centre_{};                      // of the contact (voxel)
   std::uint32_t grid_cycles_ = 0, grid_ticks_ = 0;   // since the contact began
+  std::array<int, 3> axis_waits_{};                  // how long each axis waits for a cycle, by its force
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // force and tool position of the last cycle
   ContactEnergy contact_energy_;
   double nearest_m_ = 0.0;  // smallest gap between a voxel and the tool
