@@ -63,6 +63,11 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice, Tables tables)
 
 SoftObject::~SoftObject() = default;
 
+void SoftObject::set_own_work_share(double share) noexcept {
+  own_work_share_ = share;
+  set_work_share(1.0);
+}
+
 std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
   auto result = std::make_unique<SoftObject>(lattice_, tables);
   result->state_ = state_;

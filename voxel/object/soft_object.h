@@ -83,8 +83,7 @@ class SoftObject {
   [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
   [[nodiscard]] const std::shared_ptr<const Lattice>& shared_lattice() const { return lattice_; }
   [[nodiscard]] const Displacement& state() const { return state_; }
-  // Displacement of a voxel (unit: meter). state() has it only if the object does not use patches (see
-  // below).
+  // Displacement of a voxel (unit: meter). state() has it only without patches (see below).
   [[nodiscard]] glm::dvec3 displacement(VoxelId v) const noexcept {
     return on_grid_ ? displacement_on_grid(v) : state_.at(v);
   }
@@ -104,7 +103,7 @@ class SoftObject {
   // reason and changes nothing. Returns an empty string if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
   // `margin`: voxels of the finest patch beyond the contact, on each side. A wide tool has less.
-  std::string use_composite_grid(const ToolInBody& tool, int margin = 6);
+  std::string use_composite_grid(const ToolInBody& tool, int margin);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
   // Largest relative force error in trials of use_composite_grid(), against patches twice as wide.
   [[nodiscard]] double patch_error() const { return patch_error_; }
@@ -132,10 +131,7 @@ class SoftObject {
     relaxation_.set_small_patch_share(work_share_);
   }
   // The share on any machine. On nested patches a share below 1 bounds the axes that a tick relaxes.
-  void set_own_work_share(double share) noexcept {
-    own_work_share_ = share;
-    set_work_share(1.0);
-  }
+  void set_own_work_share(double share) noexcept;
   [[nodiscard]] double work_share() const { return work_share_; }
   // Counted work (see Relaxation) that remains for this tick.
   [[nodiscard]] std::size_t work_left() const noexcept;
@@ -148,8 +144,7 @@ class SoftObject {
   // does nothing, if so few of them are due that they do not need a tick of their own.
   bool prepare_exchange() noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
-  // The tool moves by `delta` (unit: meter): each pressed voxel moves by the component of `delta` along the
-  // voxel's normal.
+  // The tool moves by `delta` (m): each pressed voxel moves by its component along the voxel's normal.
   void follow(const glm::dvec3& delta) noexcept;
   // Call it at the start of a tick. It records how deep each touched voxel is in the tool.
   void record_depths(const ToolInBody& tool) noexcept;
@@ -167,11 +162,9 @@ class SoftObject {
 
   // Call it before the first set_obstacle(). Allocates.
   void reserve_obstacles();
-  // Call it if obstacles will move, before a ShadowObject is made. Allocates all memory that moving obstacles
-  // need.
+  // Call it if obstacles will move, before a ShadowObject is made. Allocates the memory for that.
   void prepare_beside_bodies();
-  // Sets the rigid surface near surface voxel number s (index into lattice().surface()). A zero normal
-  // removes it.
+  // Sets the rigid surface near a surface voxel (index into lattice().surface()). A zero normal removes it.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
   // Call it after obstacles moved: moves these surface voxels out of them in one wave; the chain follows.
@@ -245,8 +238,7 @@ class SoftObject {
   static constexpr std::uint32_t kNoSurface = Lattice::kNoSurface;
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return lattice_->surface_number(v); }
 
-  // Displacement at any rest point in the body, interpolated between voxels (unit: meter); 0 if no voxel is
-  // near.
+  // Displacement at any rest point in the body, between voxels interpolated (m); 0 if no voxel is near.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
   // Force of the springs on the anchors (N, body frame); at rest it equals the force that presses the object.
