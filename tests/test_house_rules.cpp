@@ -138,13 +138,14 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"bench/reports", {}},
         {"bench/scenes", {"models"}},
         {"bench", {"plot", "compare", "compose", "stress"}},
+        {"bench/thesis", {"bench", "page"}},
         {"stability", {"plot", "compare", "compose", "stress"}},
         {"validate", {"page", "compare"}},
         {"study", {"tune", "compose"}},
         {"program/help", {"scene"}},
         {"program",
-         {"bench", "bench/reports", "bench/scenes", "program/help", "stability", "study", "validate",
-          "window"}}}},
+         {"bench", "bench/reports", "bench/scenes", "bench/thesis", "program/help", "stability", "study",
+          "validate", "window"}}}},
       {"interface", {{"", {}}, {"examples", {}}}},
   };
   return kRooms;

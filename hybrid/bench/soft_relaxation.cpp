@@ -233,7 +233,7 @@ TightRow tight_row(int edge, bool layered) {
   voxel::ToolInBody tool{.centre = {middle, middle, 0.0}, .radius = kRadius * kSoftSpacing_m};
   const auto pressed = [&](bool wide, const auto& look) {
     voxel::SoftObject object(lattice);
-    std::string obstacle = object.use_composite_grid(tool);
+    std::string obstacle = object.use_composite_grid(tool, kPatchMargin);
     if (!obstacle.empty()) return obstacle;
     if (wide) object.widen_patches();
     tool.centre.z = top + object.reach(tool.radius) - depth * kSoftSpacing_m;

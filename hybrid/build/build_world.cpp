@@ -195,15 +195,8 @@ class Builder {
     const voxel::ToolInBody tool = tool_in_body(*world_, world_->soft[o], glm::dvec3(0.0));
     std::string obstacle;
     if (object.lattice().voxel_count() >= voxel::SoftObject::kLeastOnGrid) obstacle = may_meet(boxes, o);
-    if (obstacle.empty()) obstacle = object.use_composite_grid(tool);
-    built_.notes.push_back(
-        {world_->soft[o].name, polygon::Severity::info,
-         obstacle.empty()
-             ? fmt::format(
-                   "contacts are kept on nested patches: a tick takes the same time for any depth and "
-                   "size (in trials, forces within {:.0f} % of those on wider patches)",
-                   std::max(1.0, std::ceil(100.0 * object.patch_error())))
-             : fmt::format("contacts are kept voxel by voxel, not on nested patches: {}", obstacle)});
+    if (obstacle.empty()) obstacle = object.use_composite_grid(tool, scene_.soft[o].patch);
+    note_patches(scene_.soft[o], object, obstacle, built_.notes);
   }
 
   void add_rigid(const RigidDescription& d) {
@@ -288,6 +281,7 @@ class Builder {
         // The volume's memory is freed as soon as the lattice has its data.
         soft_.push_back(std::make_unique<voxel::SoftObject>(
             std::make_unique<voxel::Lattice>(std::move(volumes_[o]), options)));
+        soft_.back()->set_own_work_share(d.work);
         volumes_[o] = {};
         note_memory(d, soft_.back()->lattice());
         note_felt_surface(scene_.tool, d.name, *soft_.back(), built_.notes);

@@ -8,19 +8,12 @@
 #include "voxel/baseline/thesis_chainmail.h"
 
 namespace hybrid {
-namespace {
-
-// Factor on the movement in relaxation; 1: undamped. The thesis: "some small value".
-constexpr double kDamping = 0.5;
-
-}  // namespace
-
 ModelResult classic_voxels(const Scene& scene, const SoftDescription& soft,
                            const std::vector<TraceRow>& like) {
   using Clock = std::chrono::steady_clock;
   std::vector<BuildNote> notes;
   const voxel::LabelVolume volume = build_volume(soft, notes);
-  voxel::ThesisChainMail object(volume, lattice_options(scene, soft), {.damping = kDamping});
+  voxel::ThesisChainMail object(volume, lattice_options(scene, soft), {.damping = kThesisDamping});
   const glm::dquat to_body = glm::conjugate(volume.rotation);
   ModelResult model{.name = kThesisModel, .rows = {}, .depth_m = {}, .tick_us = {}};
   const ScopedFlushToZero flushed;  // as in a session

@@ -9,6 +9,9 @@
 
 namespace hybrid {
 
+// Factor on the movement in the thesis's relaxation; 1: undamped. The thesis: "some small value".
+inline constexpr double kThesisDamping = 0.5;
+
 // Plays the soft object along the device positions of `like`. Each tick has the six-direction check, the
 // chain, the force of the lines through the touched element, and relaxation of as many elements as the
 // object's budget says. Relaxation is damped as in the thesis's final version. The tick's time includes that

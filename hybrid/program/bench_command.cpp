@@ -13,8 +13,10 @@
 #include "hybrid/bench/rigid.h"
 #include "hybrid/bench/scenes/bench_scenes.h"
 #include "hybrid/bench/soft.h"
+#include "hybrid/bench/thesis/thesis_study.h"
 #include "hybrid/bench/threads.h"
 #include "hybrid/program/commands.h"
+#include "hybrid/program/report_page.h"
 #include "hybrid/session/outputs.h"
 #include "hybrid/session/report.h"
 
@@ -205,6 +207,22 @@ void scenes_suite(const BenchCommand& command, std::FILE* words, nlohmann::order
   fmt::print(words, "\n{}", bench::scenes_summary(rows));
 }
 
+// `report`: the whole report, for the head of the page.
+void thesis_suite(const BenchCommand& command, std::FILE* words, Outputs& outputs,
+                  const nlohmann::ordered_json& report, nlohmann::ordered_json& json) {
+  const bench::ThesisStudy study =
+      bench::study_thesis({.quick = command.quick, .progress = progress_on_terminal()});
+  end_progress();
+  for (const auto& row : study.cubes) json.push_back(bench::to_json(row));
+  for (const auto& row : study.pair) json.push_back(bench::to_json(row));
+  for (const auto& row : study.threads) json.push_back(bench::to_json(row));
+  fmt::print(words, "{}", bench::thesis_table(study));
+  if (command.report.folder.empty()) return;
+  nlohmann::ordered_json of_page = report;
+  of_page["suites"] = {{"thesis", json}};
+  write_report(outputs, command.report, bench::thesis_page(study), of_page);
+}
+
 template <class Engines>
 std::vector<std::string> names_of(const Engines& engines) {
   std::vector<std::string> names;
@@ -246,12 +264,12 @@ std::vector<SuiteNames> running_suites(const BenchCommand& command) {
 }  // namespace
 
 const std::vector<std::string>& bench_suites() {
-  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy", "threads", "scenes"};
+  static const std::vector<std::string> kSuites{"rigid", "soft", "occupancy", "threads", "scenes", "thesis"};
   return kSuites;
 }
 const std::vector<BenchOption>& bench_options() {
   static const std::vector<BenchOption> kOptions{
-      {"--quick", {"rigid", "soft", "occupancy", "scenes"}},
+      {"--quick", {"rigid", "soft", "occupancy", "scenes", "thesis"}},
       {"--every-tick", {"rigid"}},
       {"--only", {"rigid", "soft", "occupancy"}},
       {"--meshes", {"rigid"}},
@@ -263,6 +281,7 @@ const std::vector<BenchOption>& bench_options() {
       {"--engines", {"rigid", "soft", "occupancy"}},
       {"--trace", {"rigid"}},
       {"--plot", {"soft", "occupancy"}},
+      {"--report", {"thesis"}},
   };
   return kOptions;
 }
@@ -340,6 +359,7 @@ void run_suites(const BenchCommand& command, Outputs& outputs, nlohmann::ordered
     threads_suite(command, words, rows_of("threads"));
   const bool all = command.suite == "all" && command.only.empty() && command.engines.empty();
   if (command.suite == "scenes" || all) scenes_suite(command, words, rows_of("scenes"));
+  if (command.suite == "thesis" || all) thesis_suite(command, words, outputs, report, rows_of("thesis"));
   if (!suites.empty()) return;
   throw std::invalid_argument(fmt::format(
       "bench {}: nothing of --only or --engines belongs to it; paths and engines of rigid are {} and {}, "
@@ -356,6 +376,7 @@ int run_bench(const BenchCommand& command) {
   Outputs outputs;
   outputs.ask_plot(command.plot);
   outputs.ask_json(command.json);
+  ask_report(outputs, command.report);
   nlohmann::ordered_json report = report_head("bench");
   report["quick"] = command.quick;
   const device::StopOnSignal stop;  // after a signal, finished rows are kept

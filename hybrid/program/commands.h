@@ -121,6 +121,7 @@ struct BenchCommand {
   std::optional<double> session_s;  // soft: simulated time of a session; threads: real time of a load
   std::filesystem::path trace;      // folder of traces; empty: none
   std::filesystem::path plot;       // soft: relaxation per round; occupancy: times; empty: none
+  ReportRequest report;             // thesis
   std::string json;
 };
 int run_bench(const BenchCommand& command);

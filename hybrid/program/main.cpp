@@ -292,6 +292,7 @@ void add_bench(CLI::App& app, int& status) {
   sub->add_option("--plot", c->plot,
                   "as SVG: of soft relaxation round by round, classic's and ours; of occupancy look-ups over "
                   "cells (with all: beside it, NAME-occupancy.svg)");
+  hybrid::add_report(*sub, c->report);
   sub->add_option("--json", c->json, "write the report as JSON; '-' is standard output");
   const CLI::App* compare = add_bench_compare(*sub, status);
   sub->callback([c, sub, compare, suites, &status] {

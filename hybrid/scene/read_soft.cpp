@@ -245,18 +245,19 @@ Thinning read_thinning(const TableReader& soft, const std::set<int>& known) {
 
 SoftSource read_source(const TableReader& table, std::string_view kind) {
   static constexpr std::string_view of_mesh[] = {
-      "name",    "mesh",   "unit",     "repair", "spacing",  "energy",   "material", "materials",
-      "anchors", "budget", "thinning", "model",  "position", "rotation", "transform"};
+      "name",   "mesh", "unit",  "repair",   "spacing", "energy",   "material", "materials", "anchors",
+      "budget", "work", "patch", "thinning", "model",   "position", "rotation", "transform"};
   static constexpr std::string_view of_volume[] = {
-      "name",     "volume",  "unit",     "labels",   "range",     "ranges",  "largest",
-      "scan",     "spacing", "energy",   "material", "materials", "anchors", "budget",
-      "thinning", "model",   "position", "rotation", "transform"};
+      "name", "volume",  "unit",     "labels",   "range",     "ranges",   "largest",
+      "scan", "spacing", "energy",   "material", "materials", "anchors",  "budget",
+      "work", "patch",   "thinning", "model",    "position",  "rotation", "transform"};
   static constexpr std::string_view of_block[] = {
-      "name",      "formula", "size",   "spacing",  "label", "layers",   "inclusions", "energy",   "material",
-      "materials", "anchors", "budget", "thinning", "model", "position", "rotation",   "transform"};
+      "name",     "formula",  "size",      "spacing",  "label",    "layers", "inclusions",
+      "energy",   "material", "materials", "anchors",  "budget",   "work",   "patch",
+      "thinning", "model",    "position",  "rotation", "transform"};
   static constexpr std::string_view of_ball[] = {
-      "name",      "formula", "size",   "spacing",  "label", "inclusions", "energy",   "material",
-      "materials", "anchors", "budget", "thinning", "model", "position",   "rotation", "transform"};
+      "name",    "formula", "size", "spacing", "label",    "inclusions", "energy",   "material", "materials",
+      "anchors", "budget",  "work", "patch",   "thinning", "model",      "position", "rotation", "transform"};
   static constexpr std::string_view any[] = {"unit", "repair", "labels", "range",  "ranges",    "largest",
                                              "scan", "size",   "label",  "layers", "inclusions"};
   static constexpr std::string_view shapes[] = {"block", "ball"};
@@ -285,9 +286,10 @@ std::optional<Energy> read_energy(const TableReader& table) {
 
 SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std::size_t number) {
   static constexpr std::string_view all[] = {
-      "name",    "mesh",    "volume",   "formula", "unit",  "repair",   "spacing",    "labels",   "range",
-      "ranges",  "largest", "scan",     "size",    "label", "layers",   "inclusions", "material", "materials",
-      "anchors", "budget",  "thinning", "energy",  "model", "position", "rotation",   "transform"};
+      "name",   "mesh",       "volume",   "formula",   "unit",     "repair",   "spacing",
+      "labels", "range",      "ranges",   "largest",   "scan",     "size",     "label",
+      "layers", "inclusions", "material", "materials", "anchors",  "budget",   "work",
+      "patch",  "thinning",   "energy",   "model",     "position", "rotation", "transform"};
   static constexpr std::string_view sources[] = {"volume", "mesh", "formula"};
   static constexpr std::string_view models[] = {"voxels", "proxy", "auto"};
   const TableReader reader = object_table(source, table, "[[soft]]", number);
@@ -306,6 +308,9 @@ SoftDescription read_soft(const SceneSource& source, const TreeNode& table, std:
   out.anchors = read_anchors(reader, known);
   out.budget = static_cast<std::uint32_t>(reader.integer("budget", 1, 1'000'000'000, out.budget));
   if (reader.has("budget")) out.budget_place = reader.place_of("budget");
+  out.work = reader.number("work", {words("a share from ", kLeastWork, " to 1"), "0.5", 1.0, kLeastWork, 1.0},
+                           out.work);
+  out.patch = static_cast<int>(reader.integer("patch", kLeastPatchMargin, kMostPatchMargin, out.patch));
   if (reader.has("thinning")) out.thinning = read_thinning(reader, known);
   if (const auto energy = read_energy(reader)) out.energy = *energy;
   static constexpr SoftModel kinds[] = {SoftModel::voxels, SoftModel::proxy, SoftModel::automatic};

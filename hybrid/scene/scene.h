@@ -186,6 +186,11 @@ struct Thinning {
 // How the object is rendered: by its voxels, by the proxy as a rigid object, or by the proxy if that is
 // enough (automatic).
 enum class SoftModel : std::uint8_t { voxels, proxy, automatic };
+// Widths of the finest nested patch (voxel::SoftObject::use_composite_grid()). A wide tool has less, because
+// more would exceed the work of a tick.
+inline constexpr int kPatchMargin = 6, kLeastPatchMargin = 4, kMostPatchMargin = 10;
+inline constexpr double kLeastWork = 0.1;
+
 struct SoftDescription {
   std::string name;
   SoftSource source;
@@ -195,6 +200,8 @@ struct SoftDescription {
   Anchors anchors;
   std::uint32_t budget = 12'000;  // voxel updates of background relaxation a tick
   SourcePlace budget_place{};     // of the key; line 0: the default
+  double work = 1.0;              // share of the work at the tool's contact that a tick does
+  int patch = kPatchMargin;       // on nested patches: voxels of the finest one beyond the contact
   std::optional<Thinning> thinning{};
   // Each voxel of the source is divided into split³ equal ones, so the shape stays. No key of a scene: it is
   // for references.

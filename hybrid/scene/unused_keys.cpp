@@ -79,7 +79,8 @@ class UnusedKeys {
       const SoftDescription& soft = scene_.soft[o];
       const TableReader table = reader(*tables[o]);
       if (soft.model == SoftModel::proxy) {
-        for (const char* key : {"material", "materials", "energy", "anchors", "thinning", "budget"}) {
+        for (const char* key :
+             {"material", "materials", "energy", "anchors", "thinning", "budget", "work", "patch"}) {
           add(table, key, soft.name,
               "the object is felt through the proxy, as rigid; remove it, or the key 'model'");
         }

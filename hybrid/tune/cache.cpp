@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kFormat = 2;  // of a record; records of another format are not found
+constexpr int kFormat = 3;  // of a record; records of another format are not found
 // First value and factor of the 64-bit FNV hash.
 constexpr std::uint64_t kFnvBegin = 0xCBF29CE484222325ULL, kFnvPrime = 0x100000001B3ULL;
 

@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 
+#include "hybrid/base/number_text.h"
 #include "hybrid/scene/edit_text.h"
 
 namespace hybrid {
@@ -24,6 +25,8 @@ std::vector<Wanted> wanted_of(const TunableObject& object, const ObjectSetting& 
     wanted.push_back({"spacing", spacing_text(setting.spacing)});
   if (setting.energy != object.own.energy)
     wanted.push_back({"energy", fmt::format("\"{}\"", energy_name(setting.energy))});
+  if (setting.work != object.own.work) wanted.push_back({"work", with_digits(setting.work, kSpacingDigits)});
+  if (setting.patch != object.own.patch) wanted.push_back({"patch", std::to_string(setting.patch)});
   return wanted;
 }
 

@@ -34,6 +34,7 @@ Evaluation evaluation_of(Played played, const ForceCourse& truth, double floor_N
       .memory_bytes = played.memory_bytes,
       .soft_voxels = played.soft_voxels,
       .load_s = played.load_s,
+      .on_patches = played.on_patches,
       .faults = std::move(played.faults),
       .refused = {}};
   std::vector<double> felt;
@@ -53,6 +54,7 @@ nlohmann::json to_json(const Evaluation& e) {
           {"memory_bytes", e.memory_bytes},
           {"soft_voxels", e.soft_voxels},
           {"load_s", e.load_s},
+          {"on_patches", e.on_patches},
           {"faults", e.faults},
           {"refused", e.refused}};
 }
@@ -66,6 +68,7 @@ Evaluation evaluation_from(const nlohmann::json& j) {
   j.at("memory_bytes").get_to(e.memory_bytes);
   j.at("soft_voxels").get_to(e.soft_voxels);
   j.at("load_s").get_to(e.load_s);
+  j.at("on_patches").get_to(e.on_patches);
   j.at("faults").get_to(e.faults);
   j.at("refused").get_to(e.refused);
   return e;

@@ -20,6 +20,7 @@ struct Evaluation {
   double felt_p99_us = 0.0;  // p99 over the ticks in which the truth feels something soft
   std::uint64_t memory_bytes = 0, soft_voxels = 0;
   double load_s = 0.0;
+  bool on_patches = false;  // an object is on nested patches
   std::vector<std::string> faults;
   std::string refused;  // why the setting cannot be built; empty if it can be built
 };

@@ -102,6 +102,8 @@ Played play_setting(const Scene& scene, const std::vector<std::string>& objects,
                 .memory_bytes = size.memory_bytes,
                 .soft_voxels = size.soft_voxels,
                 .load_s = built.seconds,
+                .on_patches = std::ranges::any_of(built.state->soft,
+                                                  [](const auto& object) { return object->uses_patches(); }),
                 .faults = fault_texts(built.state->faults)};
   for (const TraceRow& row : result.rows) played.tick_us.push_back(row.tick_us);
   return played;

@@ -25,6 +25,7 @@ struct Played {
   std::vector<double> tick_us;  // processor time of each tick
   std::uint64_t memory_bytes = 0, soft_voxels = 0;
   double load_s = 0.0;
+  bool on_patches = false;  // an object is on nested patches
   std::vector<std::string> faults;
 };
 

@@ -103,7 +103,10 @@ std::string object_in_words(const ObjectSetting& setting, double unit_m) {
     text = fmt::format("{} x {} x {} mm", with_digits(s.x * mm, 3), with_digits(s.y * mm, 3),
                        with_digits(s.z * mm, 3));
   }
-  return text + " " + energy_name(setting.energy);
+  text += std::string(" ") + energy_name(setting.energy);
+  if (setting.work < 1.0) text += ", work " + with_digits(setting.work, 2);
+  if (setting.patch != kPatchMargin) text += fmt::format(", patch {}", setting.patch);
+  return text;
 }
 
 }  // namespace
@@ -132,6 +135,8 @@ std::vector<TunableObject> tunable_objects(const Scene& as_read) {
     object.own.object = soft.name;
     object.own.proxy = std::ranges::none_of(
         decided.soft, [&](const SoftDescription& left) { return left.name == soft.name; });
+    object.own.work = soft.work;
+    object.own.patch = soft.patch;
     object.model_written = soft.model != SoftModel::voxels;
     object.other_model = as_read.tool.shape != Tool::Shape::punch;
     find_spacing(as_read, soft, object);
@@ -185,6 +190,8 @@ Scene with_setting(const Scene& as_read, const Setting& setting) {
     if (object == nullptr) continue;
     soft.model = object->proxy ? SoftModel::proxy : SoftModel::voxels;
     soft.energy = object->energy;
+    soft.work = object->work;
+    soft.patch = object->patch;
     if (object->spacing != glm::dvec3(0.0)) set_spacing_m(soft.source, object->spacing * scene.unit_m);
   }
   if (setting.coupling_N_per_m) scene.tool.stiffness_N_per_m = *setting.coupling_N_per_m;
@@ -200,6 +207,8 @@ Scene as_reference(const Scene& as_read, const Setting& setting, int split) {
     ObjectSetting* object = find(voxels, soft.name);
     if (object == nullptr) continue;
     object->proxy = false;
+    object->work = 1.0;
+    object->patch = std::max(object->patch, kPatchMargin);
     soft.thinning.reset();
     soft.split = split;
     if (yields(exact, soft)) continue;
@@ -239,6 +248,8 @@ std::string as_toml(const Setting& setting) {
     if (object.spacing != glm::dvec3(0.0))
       text += fmt::format("spacing = {} # lengths in the scene's unit\n", spacing_text(object.spacing));
     text += fmt::format("energy = \"{}\"\nmodel = \"voxels\"\n", energy_name(object.energy));
+    if (object.work != 1.0) text += fmt::format("work = {}\n", with_digits(object.work, kSpacingDigits));
+    if (object.patch != kPatchMargin) text += fmt::format("patch = {}\n", object.patch);
   }
   if (setting.coupling_N_per_m)
     text += fmt::format("# of [tool]\nstiffness = {} # N/m\n", coupling_text(*setting.coupling_N_per_m));

@@ -11,6 +11,8 @@ namespace {
 // would answer another question.
 constexpr std::array kScales{1.0, 1.125, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0};
 constexpr std::array kQuickScales{1.0, 1.25, 1.5, 2.0, 3.0, 5.0};  // factors with --quick
+// Shares of the work in a tick that are tried. On nested patches all below 2/3 are one axis in turns.
+constexpr std::array kLessWork{0.5, 0.25};
 constexpr double kStep = 1.5;  // factor on the spacing of one object while the others stay
 
 void add_new(std::vector<Setting>& settings, const Setting& setting) {
@@ -46,6 +48,28 @@ std::vector<Setting> common_settings(const std::vector<TunableObject>& objects, 
     if (objects[n].other_model) rigid.objects[n].proxy = true;
   }
   add_new(settings, rigid);
+  return settings;
+}
+
+std::vector<Setting> settings_with_less_work(const Setting& from, bool on_patches) {
+  std::vector<Setting> settings;
+  const auto add = [&](double work, int patch) {
+    Setting setting = from;
+    for (ObjectSetting& one : setting.objects) {
+      if (one.proxy) continue;
+      one.work = std::min(one.work, work);
+      one.patch = std::min(one.patch, patch);
+    }
+    if (!(setting == from)) add_new(settings, setting);
+  };
+  if (on_patches) {
+    for (const double work : {1.0, kLessWork.front()}) {
+      add(work, kMostPatchMargin);
+      add(work, kLeastPatchMargin);
+    }
+  } else {
+    for (const double work : kLessWork) add(work, kMostPatchMargin);
+  }
   return settings;
 }
 

@@ -63,6 +63,7 @@ class Search {
     find_second_motion();
     try_settings(settings);
     match_proxies();
+    try_less_work();
     if (result_.objects.size() > 1) refine();
     time_survivors();
     choose();
@@ -209,6 +210,7 @@ class Search {
     tuned.memory_bytes = evaluation.memory_bytes;
     tuned.soft_voxels = evaluation.soft_voxels;
     tuned.load_s = evaluation.load_s;
+    tuned.on_patches = evaluation.on_patches;
     tuned.faults = evaluation.faults;
     if (!evaluation.refused.empty()) tuned.left_out = "refused: " + evaluation.refused;
     std::vector<double> ticks = evaluation.tick_us;
@@ -271,6 +273,23 @@ class Search {
       match = match_stiffness(result_.truth.course, proxy, scene.tool.stiffness_N_per_m, *contact, dt_s());
     });
     return match;
+  }
+
+  // Varies the work in a tick of those settings that no other one beats. Less work is no cheaper to find out
+  // than the setting itself, so that settings that are beaten are not varied.
+  void try_less_work() {
+    const std::vector<std::size_t> whole = whole_trials();
+    const std::vector<CostAndError> points = points_of(whole, false);
+    std::vector<Setting> settings;
+    for (const std::size_t p : pareto_front(points)) {
+      const TunedSetting& from = trials_[whole[p]].tuned;
+      for (Setting& setting : settings_with_less_work(from.setting, from.on_patches)) {
+        if (std::ranges::find(settings, setting) != settings.end()) continue;
+        plan_trial(setting);
+        settings.push_back(std::move(setting));
+      }
+    }
+    try_settings(settings);
   }
 
   // With several objects: varies each of them by itself, from the common setting that would be chosen now.

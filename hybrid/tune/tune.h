@@ -40,6 +40,7 @@ struct TunedSetting {
   double felt_p99_us = 0.0;          // p99 over the ticks in which the truth feels something soft; first pass
   std::uint64_t memory_bytes = 0, soft_voxels = 0;
   double load_s = 0.0;
+  bool on_patches = false;  // an object is on nested patches
   std::vector<std::string> faults;
   std::optional<std::size_t> dominated_by;  // index of a setting that is no worse in cost and in accuracy
   [[nodiscard]] bool whole() const { return left_out.empty(); }
@@ -76,6 +77,9 @@ TuneResult tune(const Scene& as_read, const TuneOptions& options);
 
 // Settings with one scale and one energy for all objects. The scene's own setting comes first.
 std::vector<Setting> common_settings(const std::vector<TunableObject>& objects, bool quick);
+// `from` with less work in a tick for the voxels of all objects: smaller shares of it, and, with
+// `on_patches`, also narrower patches, and both. Values of `from` that are as low already stay.
+std::vector<Setting> settings_with_less_work(const Setting& from, bool on_patches);
 // Variations of `from` in one object each: one step coarser or finer, with the other energy, or rendered by
 // the proxy.
 std::vector<Setting> settings_beside(const std::vector<TunableObject>& objects, const Setting& from);

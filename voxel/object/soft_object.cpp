@@ -63,6 +63,11 @@ SoftObject::SoftObject(std::shared_ptr<const Lattice> lattice, Tables tables)
 
 SoftObject::~SoftObject() = default;
 
+void SoftObject::set_own_work_share(double share) noexcept {
+  own_work_share_ = share;
+  set_work_share(1.0);
+}
+
 std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
   auto result = std::make_unique<SoftObject>(lattice_, tables);
   result->state_ = state_;
@@ -76,6 +81,7 @@ std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
   result->touched_voxels_.assign(touched_voxels_.begin(), touched_voxels_.end());
   result->touched_numbers_.assign(touched_numbers_.begin(), touched_numbers_.end());
   result->moved_ever_ = moved_ever_;
+  result->set_own_work_share(own_work_share_);
   result->relaxation_.copy_from(relaxation_);
   if (grid_) {
     result->grid_ = std::make_unique<CompositeGrid>(*grid_);
@@ -93,6 +99,7 @@ std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
     result->nearest_m_ = nearest_m_;
     result->grid_cycles_ = grid_cycles_;
     result->grid_ticks_ = grid_ticks_;
+    result->axis_waits_ = axis_waits_;
   }
   if (relaxation_.left_to_shadow()) result->relaxation_.renew_coarse(result->state_, result->obstacle_view());
   return result;

@@ -83,8 +83,7 @@ class SoftObject {
   [[nodiscard]] const Lattice& lattice() const { return *lattice_; }
   [[nodiscard]] const std::shared_ptr<const Lattice>& shared_lattice() const { return lattice_; }
   [[nodiscard]] const Displacement& state() const { return state_; }
-  // Displacement of a voxel (unit: meter). state() has it only if the object does not use patches (see
-  // below).
+  // Displacement of a voxel (unit: meter). state() has it only without patches (see below).
   [[nodiscard]] glm::dvec3 displacement(VoxelId v) const noexcept {
     return on_grid_ ? displacement_on_grid(v) : state_.at(v);
   }
@@ -103,7 +102,8 @@ class SoftObject {
   // still. Call use_composite_grid() before obstacles are set. If the object is unsuitable, returns the
   // reason and changes nothing. Returns an empty string if patches are in use. Allocates.
   static constexpr std::size_t kLeastOnGrid = 10'000;  // voxels
-  std::string use_composite_grid(const ToolInBody& tool);
+  // `margin`: voxels of the finest patch beyond the contact, on each side. A wide tool has less.
+  std::string use_composite_grid(const ToolInBody& tool, int margin);
   [[nodiscard]] bool uses_patches() const { return grid_ != nullptr; }
   // Largest relative force error in trials of use_composite_grid(), against patches twice as wide.
   [[nodiscard]] double patch_error() const { return patch_error_; }
@@ -127,9 +127,11 @@ class SoftObject {
   // Share (0 to 1) of the counted work that a tick may spend on its contact under asynchronous relaxation;
   // less than 1 for a slow machine. Later ticks do the remaining work.
   void set_work_share(double share) noexcept {
-    work_share_ = share;
-    relaxation_.set_small_patch_share(share);
+    work_share_ = own_work_share_ * share;
+    relaxation_.set_small_patch_share(work_share_);
   }
+  // The share on any machine. On nested patches a share below 1 bounds the axes that a tick relaxes.
+  void set_own_work_share(double share) noexcept;
   [[nodiscard]] double work_share() const { return work_share_; }
   // Counted work (see Relaxation) that remains for this tick.
   [[nodiscard]] std::size_t work_left() const noexcept;
@@ -142,8 +144,7 @@ class SoftObject {
   // does nothing, if so few of them are due that they do not need a tick of their own.
   bool prepare_exchange() noexcept;
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
-  // The tool moves by `delta` (unit: meter): each pressed voxel moves by the component of `delta` along the
-  // voxel's normal.
+  // The tool moves by `delta` (m): each pressed voxel moves by its component along the voxel's normal.
   void follow(const glm::dvec3& delta) noexcept;
   // Call it at the start of a tick. It records how deep each touched voxel is in the tool.
   void record_depths(const ToolInBody& tool) noexcept;
@@ -161,11 +162,9 @@ class SoftObject {
 
   // Call it before the first set_obstacle(). Allocates.
   void reserve_obstacles();
-  // Call it if obstacles will move, before a ShadowObject is made. Allocates all memory that moving obstacles
-  // need.
+  // Call it if obstacles will move, before a ShadowObject is made. Allocates the memory for that.
   void prepare_beside_bodies();
-  // Sets the rigid surface near surface voxel number s (index into lattice().surface()). A zero normal
-  // removes it.
+  // Sets the rigid surface near a surface voxel (index into lattice().surface()). A zero normal removes it.
   void set_obstacle(std::size_t surface_number, const Obstacle& obstacle) noexcept;
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
   // Call it after obstacles moved: moves these surface voxels out of them in one wave; the chain follows.
@@ -239,8 +238,7 @@ class SoftObject {
   static constexpr std::uint32_t kNoSurface = Lattice::kNoSurface;
   [[nodiscard]] std::uint32_t surface_number(VoxelId v) const { return lattice_->surface_number(v); }
 
-  // Displacement at any rest point in the body, interpolated between voxels (unit: meter); 0 if no voxel is
-  // near.
+  // Displacement at any rest point in the body (m), interpolated between voxels; 0 if no voxel is near.
   [[nodiscard]] glm::dvec3 displacement_at(const glm::dvec3& rest_point) const noexcept;
 
   // Force of the springs on the anchors (N, body frame); at rest it equals the force that presses the object.
@@ -368,6 +366,7 @@ class SoftObject {
   void press_on_grid(const ToolInBody& tool) noexcept;
   void settle_on_grid(const ToolInBody& tool) noexcept;
   [[nodiscard]] std::array<bool, 3> axes_due(const glm::dvec3& way_m) noexcept;
+  [[nodiscard]] std::array<bool, 3> fewer_axes_due() noexcept;
   [[nodiscard]] Reaction reaction_on_grid(const ToolInBody& tool) const noexcept;
   [[nodiscard]] bool at_anchors_end(VoxelId v, const glm::dvec3& direction) const noexcept;
   // Bound of a pressed voxel on one axis: the axis, the direction out of the tool, and the displacement at
@@ -421,7 +420,7 @@ class SoftObject {
   std::size_t contact_work_ = 0;             // counted work of contact cycles since touch() …
   int cycles_since_touch_ = 0;               // … and their number
   int cold_ticks_ = 0;  // ticks for which the contact's neighbourhood is not in the caches yet
-  double work_share_ = 1.0;
+  double own_work_share_ = 1.0, work_share_ = 1.0;
   bool split_cycle_ = false;  // a cycle around a large patch ran, or a part of one
   bool skip_requested_ = false;
   bool skips_cycle_ = false;  // no contact cycle begins in this tick unless the tool jumps
@@ -441,6 +440,7 @@ class SoftObject {
   std::vector<TouchOnGrid> touches_on_grid_;
   std::array<int, 3> centre_{};                      // of the contact (voxel)
   std::uint32_t grid_cycles_ = 0, grid_ticks_ = 0;   // since the contact began
+  std::array<int, 3> axis_waits_{};                  // how long each axis waits for a cycle, by its force
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // force and tool position of the last cycle
   ContactEnergy contact_energy_;
   double nearest_m_ = 0.0;  // smallest gap between a voxel and the tool

@@ -16,9 +16,8 @@
 namespace voxel {
 namespace {
 
-// Voxels of the finest patch beyond the contact. A wide tool has fewer, at least kLeastMargin, because more
-// would exceed the work of a tick.
-constexpr int kMargin = 6, kLeastMargin = 4;
+// Voxels of the finest patch beyond the contact of a wide tool, at least.
+constexpr int kLeastMargin = 4;
 // Fraction of the force, and of the tool's motion. An axis with less of both is relaxed in every second tick.
 constexpr double kFelt = 0.3;
 constexpr std::uint32_t kAllAxes = 4;  // number of cycles at the start of a contact that relax all axes
@@ -56,7 +55,7 @@ double depth_of(const glm::dvec3& dent_m, const glm::dvec3& force_N) noexcept {
 
 }  // namespace
 
-std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
+std::string SoftObject::use_composite_grid(const ToolInBody& tool, int margin) {
   if (lattice_->voxel_count() < kLeastOnGrid)
     return "it has fewer than " + std::to_string(kLeastOnGrid) + " voxels";
   assert(obstacles_.empty() && !moved_ever_);  // obstacles are set only after this call
@@ -69,7 +68,7 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool) {
   const double share = tool.shape == ToolInBody::Shape::punch ? 1.0 : steepest / std::hypot(1.0, steepest);
   const int contact = static_cast<int>(std::ceil(share * reach(tool.radius) / h));
   if (contact + kLeastMargin > CompositeGrid::kMaxHalfWidth) return "the tool is many voxels wide";
-  const int half = std::min(contact + kMargin, CompositeGrid::kMaxHalfWidth);
+  const int half = std::min(contact + margin, CompositeGrid::kMaxHalfWidth);
   CompositeGrid::Suitability suitability = CompositeGrid::suitability(*lattice_);
   if (!suitability.reason.empty()) return suitability.reason;
   patch_error_ = suitability.force_error;
@@ -192,6 +191,7 @@ bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
     on_grid_ = moved_ever_ = true;
     list_near_on_grid();
     grid_cycles_ = grid_ticks_ = 0;
+    axis_waits_ = {};
     grid_force_N_ = glm::dvec3(0.0);
     contact_energy_.begin();
   }
@@ -306,11 +306,29 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
   for (int d = 0; d < 3; ++d) centre_[static_cast<std::size_t>(d)] = static_cast<int>(std::lround(sum[d]));
 }
 
+// With a share of the work below 1: as many axes as the share allows, at least one. They take turns, and an
+// axis that carries force has its turn twice as often.
+std::array<bool, 3> SoftObject::fewer_axes_due() noexcept {
+  const int most = std::max(1, static_cast<int>(3.0 * work_share_));
+  const double felt = kFelt * glm::length(grid_force_N_);
+  for (int d = 0; d < 3; ++d)
+    axis_waits_[static_cast<std::size_t>(d)] += std::abs(grid_force_N_[d]) > felt ? 2 : 1;
+  std::array<bool, 3> due{};
+  for (int n = 0; n < most; ++n) {
+    const auto longest =
+        static_cast<std::size_t>(std::ranges::max_element(axis_waits_) - axis_waits_.begin());
+    due[longest] = true;
+    axis_waits_[longest] = 0;
+  }
+  return due;
+}
+
 // Axes to relax in the next cycle, before which the tool moves by `way_m`. An axis that carries little force
 // and along which the tool hardly moves changes little, so it is relaxed in every second tick.
 std::array<bool, 3> SoftObject::axes_due(const glm::dvec3& way_m) noexcept {
   const bool first_of_tick = contact_work_ == 0;
   if (first_of_tick) ++grid_ticks_;
+  if (work_share_ < 1.0) return fewer_axes_due();
   if (grid_cycles_++ < kAllAxes) return {true, true, true};
   std::array<bool, 3> due{};
   const double felt_N = kFelt * glm::length(grid_force_N_), least_m = kFelt * glm::length(way_m);
@@ -329,7 +347,8 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   tool_ = tool;
   if (!on_grid_) return;
   const bool moved = glm::distance(tool.centre, grid_tool_m_) >= kMoves * lattice_->min_spacing_m();
-  if (contact_work_ >= (moved ? 2 : 1) * grid_->work_of_cycle() && contact_work_ > 0) {
+  const std::size_t cycles = moved && work_share_ >= 1.0 ? 2 : 1;
+  if (contact_work_ >= cycles * grid_->work_of_cycle() && contact_work_ > 0) {
     settle_on_grid(tool);
     return;
   }

@@ -168,6 +168,33 @@ constexpr std::array kScenesKeys{
     ReportKey{"load_s", measured},
 };
 
+constexpr std::array kThesisKeys{
+    ReportKey{"case", identity},
+    ReportKey{"engine", identity},
+    ReportKey{"model", identity},
+    ReportKey{"thread", identity},
+    ReportKey{"hand", detail},
+    ReportKey{"depth_mm", identity},
+    ReportKey{"speed_mm_per_s", identity},
+    ReportKey{"elements", detail},
+    ReportKey{"thesis_percent", detail},
+    ReportKey{"ticks", context},             // of a cube that is late the session ends early
+    ReportKey{"force_error_jnd", measured},  // the largest cube depends on the machine
+    ReportKey{"voxels", measured},
+    ReportKey{"edge", measured},
+    ReportKey{"late_edge", measured},
+    ReportKey{"late_share", measured},
+    ReportKey{"contact_share", measured},
+    ReportKey{"p50_us", measured},
+    ReportKey{"p99_us", measured},
+    ReportKey{"p999_us", measured},
+    ReportKey{"max_us", measured},
+    ReportKey{"memory_bytes", measured},
+    ReportKey{"load_s", measured},
+    ReportKey{"ms_per_s", measured},
+    ReportKey{"ms_per_s_voxel_by_voxel", measured},
+};
+
 }  // namespace
 
 std::span<const ReportKey> keys_of(std::string_view suite) {
@@ -176,6 +203,7 @@ std::span<const ReportKey> keys_of(std::string_view suite) {
   if (suite == "occupancy") return kOccupancyKeys;
   if (suite == "threads") return kThreadsKeys;
   if (suite == "scenes") return kScenesKeys;
+  if (suite == "thesis") return kThesisKeys;
   return {};
 }
 

@@ -191,6 +191,7 @@ TEST_F(SceneFile, SoftSources) {
       "[[soft]]\nname = \"v\"\nvolume = \"head.nii\"\nspacing = [1, 1, 3]\nlargest = false\n"
       "ranges = [{ range = [-50, 100], label = 2 }, { range = [200, 900], label = 9 }]\n"
       "materials = { \"9\" = \"b\", 2 = \"a\" }\nanchors = { labels = [9], rigid_within = 2 }\nbudget = 5\n"
+      "work = 0.25\npatch = 8\n"
       "[[soft]]\nname = \"l\"\nvolume = \"head.nii\"\nlabels = [7, 4]\n"
       "[[soft]]\nname = \"all\"\nvolume = \"head.nii\"\nmaterials = { \"200\" = \"b\" }\n"
       "[[soft]]\nname = \"m\"\nmesh = \"bone.ply\"\nspacing = 2\n"
@@ -212,6 +213,9 @@ TEST_F(SceneFile, SoftSources) {
   EXPECT_EQ(scene.soft[0].anchors.labels, std::vector<std::uint8_t>{9});
   EXPECT_DOUBLE_EQ(scene.soft[0].anchors.rigid_within_m, 2e-3);
   EXPECT_EQ(scene.soft[0].budget, 5U);
+  EXPECT_DOUBLE_EQ(scene.soft[0].work, 0.25);
+  EXPECT_EQ(scene.soft[0].patch, 8);
+  EXPECT_EQ(scene.soft[1].patch, hybrid::kPatchMargin);
   EXPECT_EQ(std::get<hybrid::VolumeSource>(scene.soft[1].source).rules.at(0).label, 4);
   EXPECT_TRUE(std::get<hybrid::VolumeSource>(scene.soft[2].source).rules.empty());
   expect_near(std::get<hybrid::ClosedMeshSource>(scene.soft[3].source).spacing_m, glm::dvec3(2e-3));

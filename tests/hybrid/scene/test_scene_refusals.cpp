@@ -129,6 +129,8 @@ const Broken broken[] = {
     {"texture-kind-unknown", "6:56", "unknown", "height, shading"},
     {"texture-key-unknown", "6:42", "'heigth'", "'height'"},
     {"yield-of-bricks", "5:1", "both a yield", "take one"},
+    {"work-above-one", "7:1", "is 1.5", "from 0.1 to 1"},
+    {"patch-too-narrow", "7:1", "is 3", "4 to 10"},
     {"later-energy", "7:1", "not supported yet", "trilinear"},
     {"later-device", "3:1", "not supported yet", "ideal"},
     {"device-scale-simulated", "4:1", "no meaning with a simulated model", "remove it"},

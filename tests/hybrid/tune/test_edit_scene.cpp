@@ -57,6 +57,8 @@ class EditScene : public tests::SceneFile {
         values.spacing.z = std::strtod(hybrid::with_digits(1.0 + pick(999) / 997.0, 7).c_str(), nullptr);
     }
     if (coin()) values.energy = coin() ? Energy::trilinear : Energy::six_link;
+    if (coin()) values.work = 0.25 * (1 + pick(4));
+    if (coin()) values.patch = 4 + pick(7);
     values.proxy = pick(4) == 0;
     return values;
   }
@@ -90,6 +92,8 @@ void expect_values(const hybrid::Scene& wanted, const hybrid::Scene& read) {
     const auto &a = wanted.soft[n], &b = read.soft[n];
     EXPECT_EQ(a.name, b.name);
     EXPECT_EQ(a.energy, b.energy);
+    EXPECT_EQ(a.work, b.work);
+    EXPECT_EQ(a.patch, b.patch);
     EXPECT_EQ(std::get<voxel::Formula>(a.source).spacing_m, std::get<voxel::Formula>(b.source).spacing_m);
   }
 }

@@ -334,6 +334,30 @@ TEST_F(Tune, APathThatTouchesNothingSoftIsRefused) {
   }
 }
 
+TEST_F(Tune, LessWorkIsTriedWhereItHasAnEffect) {
+  const auto objects = hybrid::tunable_objects(
+      hybrid::read_scene(write("s.toml", "format = 1\n" + tests::block + tests::path)));
+  hybrid::Setting own = hybrid::own_setting(objects);
+  const auto voxels = hybrid::settings_with_less_work(own, false);
+  ASSERT_EQ(voxels.size(), 2U);
+  for (const auto& setting : voxels) {
+    EXPECT_LT(setting.objects[0].work, 1.0);
+    EXPECT_EQ(setting.objects[0].patch, own.objects[0].patch);
+  }
+  EXPECT_EQ(hybrid::settings_with_less_work(own, true).size(), 3U);
+  EXPECT_THAT(hybrid::in_words(voxels[0], 1e-3), HasSubstr("six-link, work 0.5"));
+  EXPECT_THAT(hybrid::as_toml(voxels[0]), HasSubstr("work = 0.5\n"));
+  // The truth does all of the work.
+  EXPECT_EQ(hybrid::as_reference(hybrid::read_scene(write(
+                                     "s.toml", "format = 1\n" + tests::block + "work = 0.5\n" + tests::path)),
+                                 voxels[0])
+                .soft[0]
+                .work,
+            1.0);
+  own.objects[0].proxy = true;
+  EXPECT_TRUE(hybrid::settings_with_less_work(own, true).empty());
+}
+
 TEST_F(Tune, SettingsBesideOneChangeOneObject) {
   const std::string two = tests::block +
                           "position = [0, 0, 0]\n[[soft]]\nname = \"other\"\nformula = \"ball\"\n" +

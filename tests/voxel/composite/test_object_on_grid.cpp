@@ -17,7 +17,7 @@ using voxel::VoxelId;
 
 struct Pressed {
   tests::SoftBlock block{{64, 64, 64}, kSpacing, slack(0.1)};
-  bool on_grid = block.object->use_composite_grid(block.ball(8.0 * kSpacing, 0.0)).empty();
+  bool on_grid = block.object->use_composite_grid(block.ball(8.0 * kSpacing, 0.0), 6).empty();
 
   voxel::Reaction to(double depth, int ticks) {
     const voxel::ToolInBody tool = block.ball(8.0 * kSpacing, depth * kSpacing);
