@@ -176,7 +176,8 @@ TEST(HouseRules, EverySourceLiesInARoom) {
     const auto [part, room] = room_of(file.path);
     if (part.empty()) continue;
     const auto& known = rooms().at(part);
-    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const Room& r) { return room == r.name; }))
+    EXPECT_TRUE(
+        std::any_of(known.begin(), known.end(), [&room = room](const Room& r) { return room == r.name; }))
         << file.path << ":1: " << part << "/" << room << " is no room of " << part
         << ": move the file into one, or add the room to the table in this test, with the rooms below it";
   }
@@ -200,7 +201,8 @@ TEST(HouseRules, TestsMirrorTheRooms) {
     const auto [part, room] = room_of(file.path.substr(std::string_view("tests/").size()));
     if (part.empty() || room == "fixtures" || room == "phantom/fake_libhd") continue;
     const auto& known = rooms().at(part);
-    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const Room& r) { return room == r.name; }))
+    EXPECT_TRUE(
+        std::any_of(known.begin(), known.end(), [&room = room](const Room& r) { return room == r.name; }))
         << file.path << ":1: tests of a room lie in the folder of its name; what several share, in fixtures/";
   }
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "hybrid/base/histogram.h"
 #include "hybrid/compose/compose.h"
 #include "hybrid/study/pair_scans.h"
 #include "hybrid/tune/front.h"

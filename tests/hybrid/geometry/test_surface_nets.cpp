@@ -187,8 +187,8 @@ TEST(IntensitySurface, PassesTheEndOfTheRangeThatIsThere) {
   constexpr double kInner = 6.0;
   for (std::size_t n = 0; n < scan.intensities.size(); ++n) {
     const auto row = static_cast<std::size_t>(scan.volume.dims[0]);
-    const glm::dvec3 p(static_cast<double>(n % row), static_cast<double>(n / row % row),
-                       static_cast<double>(n / (row * row)));
+    const std::size_t i = n % row, j = n / row % row, k = n / (row * row);
+    const glm::dvec3 p(i, j, k);
     const double depth = kInner - glm::length(p - scan.middle);
     if (depth > -1.0) scan.intensities[n] = static_cast<float>(2000.0 + 500.0 * std::min(depth, 1.0));
     scan.volume.labels[n] = scan.intensities[n] >= kThreshold && scan.intensities[n] <= 2000.0F ? 1 : 0;
