@@ -11,7 +11,6 @@
 namespace {
 
 using hybrid::bench::LargestCube;
-using hybrid::bench::PairRow;
 using hybrid::bench::SoftEngine;
 using hybrid::bench::ThesisStudy;
 using hybrid::bench::Vigour;
