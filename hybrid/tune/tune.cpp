@@ -275,11 +275,14 @@ class Search {
     return match;
   }
 
-  // Varies the work in a tick of those settings that no other one beats. Less work is no cheaper to find out
-  // than the setting itself, so that settings that are beaten are not varied.
+  // Varies the work in a tick of those settings that no other one beats in error and number of voxels. Less
+  // work is no cheaper to find out than the setting itself, so that settings that are beaten are not varied.
+  // The number of voxels stands for the cost, because a search that goes on must try the same settings.
   void try_less_work() {
     const std::vector<std::size_t> whole = whole_trials();
-    const std::vector<CostAndError> points = points_of(whole, false);
+    std::vector<CostAndError> points = points_of(whole, false);
+    for (std::size_t p = 0; p < whole.size(); ++p)
+      points[p].cost_us = weight(trials_[whole[p]].tuned.setting);
     std::vector<Setting> settings;
     for (const std::size_t p : pareto_front(points)) {
       const TunedSetting& from = trials_[whole[p]].tuned;

@@ -361,7 +361,7 @@ TEST_F(GridSession, TissueOnABoneIsFeltAsAtRest) {
       for (int n = 1; n <= steps; ++n) {
         const glm::dvec3 at = from + (to - from) * (static_cast<double>(n) / steps);
         const glm::dvec3 moving_N = fast.at(at).force_N;
-        const glm::dvec3 at_rest_N = slow.go(at, 5e-6).force_N;
+        const glm::dvec3 at_rest_N = slow.go(at, 5e-6, 10).force_N;
         most_jnd = std::max(most_jnd, hybrid::jnd_of(moving_N, at_rest_N, hybrid::kJndFloor_N));
         most_overlap = std::max(most_overlap, overlap(fast));
       }
