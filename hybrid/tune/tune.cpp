@@ -277,15 +277,17 @@ class Search {
 
   // Varies the work in a tick of those settings that no other one beats in error and number of voxels. Less
   // work is no cheaper to find out than the setting itself, so that settings that are beaten are not varied.
-  // The number of voxels stands for the cost, because a search that goes on must try the same settings.
+  // The number of voxels stands for the cost, and settings that were left out count too. So the choice does
+  // not depend on measured times, and a search that goes on tries the same settings.
   void try_less_work() {
-    const std::vector<std::size_t> whole = whole_trials();
-    std::vector<CostAndError> points = points_of(whole, false);
-    for (std::size_t p = 0; p < whole.size(); ++p)
-      points[p].cost_us = weight(trials_[whole[p]].tuned.setting);
+    std::vector<CostAndError> points;
+    for (const Trial& trial : trials_) {
+      const TunedSetting& tuned = trial.tuned;
+      points.push_back({weight(tuned.setting), tuned.error.worst_jnd(), tuned.faults.empty()});
+    }
     std::vector<Setting> settings;
     for (const std::size_t p : pareto_front(points)) {
-      const TunedSetting& from = trials_[whole[p]].tuned;
+      const TunedSetting& from = trials_[p].tuned;
       for (Setting& setting : settings_with_less_work(from.setting, from.on_patches)) {
         if (std::ranges::find(settings, setting) != settings.end()) continue;
         plan_trial(setting);
