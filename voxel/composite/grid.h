@@ -359,7 +359,7 @@ class CompositeGrid {
   void save_multipliers(const Level& level) noexcept;
   void restore_multipliers(Level& level, const Index3& by) noexcept;
   // Limit of the links along d for differences of the displacements on `axis`; side 0: shorter, 1: longer.
-  // Its at_node is of the level's first row.
+  // The result's at_node begins at the level's first row.
   [[nodiscard]] composite::LimitOfLinks limit_of_links(const Level& level, std::size_t axis, std::size_t d,
                                                        std::size_t side) const noexcept;
   [[nodiscard]] composite::LinkMultiplier link_multiplier(const Level& level, std::size_t axis,
