@@ -12,6 +12,7 @@
 #include "hybrid/bench/soft.h"
 #include "hybrid/bench/soft_engines.h"
 #include "hybrid/build/build_world.h"
+#include "hybrid/compare/compare.h"
 #include "hybrid/session/session.h"
 #include "hybrid/tick/tick.h"
 #include "hybrid/tick/tissue/press_tissue.h"
@@ -86,12 +87,9 @@ const char* smooth_name(Smooth block) {
 }
 
 Scene stroke_scene(const StrokeCase& stroke) {
-  Scene scene;
+  Scene scene = on_ideal_device({});
   scene.file = fmt::format("stroke over a {} object", smooth_name(stroke.block));
   scene.tool.radius_m = stroke.radius_spacings * kSoftSpacing_m;
-  scene.device_model = device::DeviceModel::ideal;
-  scene.max_force_given = true;
-  scene.safety = {.max_force_N = 1e6, .max_slew_N_per_s = 1e12, .soft_start_s = 0.0};
   scene.materials["tissue"] = {.young_Pa = kYoung, .place = {}};
   scene.materials["firm"] = {.young_Pa = 4.0 * kYoung, .place = {}};
   voxel::Formula formula{.size_m = glm::dvec3(kWide, kWide, kHigh) * kSoftSpacing_m,

@@ -8,6 +8,7 @@
 #include "device/loop/stop_signal.h"
 #include "hybrid/bench/soft.h"
 #include "hybrid/bench/soft_engines.h"
+#include "hybrid/compare/compare.h"
 #include "hybrid/session/session.h"
 
 namespace hybrid::bench {
@@ -27,12 +28,9 @@ double depth_for(int edge) {
 // place. The tool's travel upwards and sideways is proportional to its depth. So the share of time in contact
 // is the same for all sizes. Otherwise median times would depend on that share, not on the size.
 Scene cube_scene(int edge, double seconds) {
-  Scene scene;
+  Scene scene = on_ideal_device({});
   scene.file = fmt::format("cube of {} voxels an edge", edge);
   scene.tool.radius_m = kToolRadius;
-  scene.device_model = device::DeviceModel::ideal;
-  scene.max_force_given = true;
-  scene.safety = {.max_force_N = 1e6, .max_slew_N_per_s = 1e12, .soft_start_s = 0.0};
   scene.materials["tissue"] = {
       .stretch_min = 1.0 - kSlack, .stretch_max = 1.0 + kSlack, .shear = kSlack, .place = {}};
   voxel::Formula cube{.size_m = glm::dvec3(edge * kSoftSpacing_m),

@@ -2,6 +2,7 @@
 #include "hybrid/models/difference_map.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <thread>

@@ -128,7 +128,7 @@ class SceneReload {
 class RestWish {
  public:
   // `says` tells the user why the comparison cannot begin. `between` calls its argument between two ticks. If
-  // it does not, the next call tries again.
+  // `between` does not call it, the next follow() tries again.
   template <class Says, class Between>
   void follow(bool wished, Player& player, Says& says, const Between& between) {
     if (wished == on_) return;

@@ -124,8 +124,8 @@ void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera&
 // Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in
 // it.
 void draw_force_chart(const Pen& pen, const PixelRect& where, const TickHistory& history);
-// The same as areas: what each part adds lies above the line of zero, what it takes away below. A line is the
-// force on the hand.
+// Draws the parts of the force as stacked areas. A part that adds to the force lies above zero, a part that
+// reduces it below. A line shows the force on the hand.
 void draw_force_parts(const Pen& pen, const PixelRect& where, const TickHistory& history);
 // Draws tick times on a logarithmic axis, with a line at the servo period.
 void draw_tick_times(const Pen& pen, const PixelRect& where, const TickTimes& times);

@@ -13,7 +13,6 @@ constexpr double kLetGo = 0.97;  // fraction of the stored energy; if less was g
 constexpr double kLeast = 0.8;   // lower bound of the share, because work may be counted wrongly
 constexpr double kStands = 1e-5;     // fraction of the stored energy; with less work in a tick the tool rests
 constexpr double kComesBack = 0.02;  // fraction of the missing energy that is forgiven in a tick at rest
-constexpr double kNoContact_N = 1e-5;  // a smaller force ends the contact
 
 }  // namespace
 

@@ -9,9 +9,9 @@
 // A contact stores at least a third of force times depth. (It stores a third if active chain limits give the
 // dent the shape of a cone, where E ~ depth³, and half without active limits.) If the contact was given less,
 // the force is scaled by share(), the ratio of the two energies, which is at least 0.8. The lower bound is
-// needed because work is counted wrongly where tissue is stiffer than the tool's coupling. The share does not
-// depend on the direction of the motion. Otherwise the tool would move to and fro as the share changes. It
-// returns to 1 while the tool presses on or rests, and a new contact begins with 1.
+// needed because work is counted wrongly where tissue is stiffer than the tool's coupling. The share is the
+// same for a tool that goes in and one that goes out. A share that changes with the direction makes the tool
+// move to and fro. The share returns to 1 while the tool presses on or rests. A new contact begins with 1.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -20,6 +20,7 @@ namespace voxel {
 
 class ContactEnergy {
  public:
+  static constexpr double kNoContact_N = 1e-5;  // a smaller force ends a contact
   // Call it when a contact begins. At the next account() the contact counts as given exactly the energy that
   // it then stores, a third of force times depth. From then on work of the tool is added.
   void begin() noexcept { *this = {}; }

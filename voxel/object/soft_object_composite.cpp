@@ -30,7 +30,6 @@ constexpr double kWithDepth = 1.7;
 constexpr double kLeastToScale = 0.1, kMostScaled = 1.0;
 constexpr double kLeastDepth = 0.05;  // fraction of the spacing: least depth for the secant stiffness
 constexpr double kNear = 3.0;         // spacings: surface voxels further from the tool are skipped
-constexpr double kAtRest_N = 1e-5;    // force on the tool below which a contact with nothing pressed ends
 constexpr double kMoves = 0.03;       // spacings: a tool that moved further gets a second cycle in the tick
 constexpr double kFlat = 1.5;  // greatest ratio of spacings for which the width of a ball's contact is known
 
@@ -363,7 +362,7 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   contact_energy_.account(tool.centre - grid_tool_m_, grid_force_N_, depth_of(dent_m_, grid_force_N_));
   grid_tool_m_ = tool.centre;
   const bool away = nearest_m_ > kOnItsWay * lattice_->min_spacing_m();
-  if (away && glm::length(grid_force_N_) < kAtRest_N) on_grid_ = false;
+  if (away && glm::length(grid_force_N_) < ContactEnergy::kNoContact_N) on_grid_ = false;
 }
 
 Reaction SoftObject::reaction_on_grid(const ToolInBody& tool) const noexcept {

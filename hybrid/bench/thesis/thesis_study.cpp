@@ -15,6 +15,7 @@
 #include "hybrid/base/thread_time.h"
 #include "hybrid/bench/thesis/thesis_threads.h"
 #include "hybrid/build/build_objects.h"
+#include "hybrid/compare/compare.h"
 #include "hybrid/compare/compare_scenes.h"
 #include "hybrid/compare/thesis_rendering.h"
 #include "hybrid/session/session.h"
@@ -57,12 +58,9 @@ device::WaypointPath pressing_path(int edge, const Vigour& vigour, double second
 }
 
 Scene study_scene(int edge, const Vigour& vigour, double seconds) {
-  Scene scene;
+  Scene scene = on_ideal_device({});
   scene.file = fmt::format("cube of {} voxels an edge", edge);
   scene.tool.radius_m = kToolRadius_m;
-  scene.device_model = device::DeviceModel::ideal;
-  scene.max_force_given = true;
-  scene.safety = {.max_force_N = 1e6, .max_slew_N_per_s = 1e12, .soft_start_s = 0.0};
   scene.path = pressing_path(edge, vigour, seconds);
   return scene;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a hand tells two models apart: on a block of two halves, of which the models agree on one.
+// The map of the felt difference of two models. The block has two halves; the models differ on one of them.
 #include "hybrid/models/difference_map.h"
 
 #include <gtest/gtest.h>
