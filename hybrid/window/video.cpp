@@ -21,6 +21,11 @@ namespace {
 
 constexpr const char* kFfmpeg = "ffmpeg";
 
+// The descriptor of ffmpeg on which it finds the file. The file has no name until it is whole, so that
+// nothing is left however both programs end.
+constexpr int kOutput = 3;
+constexpr const char* kOutputName = "/dev/fd/3";
+
 // Name of ffmpeg's container format.
 std::string format_of(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
@@ -28,24 +33,25 @@ std::string format_of(const std::filesystem::path& file) {
 }
 
 // Most players want an even number of pixels along each side, and colours at half of the resolution.
-std::vector<std::string> words_of(const FilePlace& place, int width, int height, int frames_per_s) {
-  return {kFfmpeg,        "-loglevel",
-          "error",        "-y",
-          "-f",           "rawvideo",
-          "-pix_fmt",     "rgb24",
-          "-s",           fmt::format("{}x{}", width, height),
-          "-r",           std::to_string(frames_per_s),
-          "-i",           "-",
-          "-vf",          "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-          "-pix_fmt",     "yuv420p",
-          "-f",           format_of(place.asked),
-          place.temporary};
+std::vector<std::string> words_of(const std::filesystem::path& file, int width, int height,
+                                  int frames_per_s) {
+  return {kFfmpeg,    "-loglevel",
+          "error",    "-y",
+          "-f",       "rawvideo",
+          "-pix_fmt", "rgb24",
+          "-s",       fmt::format("{}x{}", width, height),
+          "-r",       std::to_string(frames_per_s),
+          "-i",       "-",
+          "-vf",      "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+          "-pix_fmt", "yuv420p",
+          "-f",       format_of(file),
+          kOutputName};
 }
 
-// Starts ffmpeg with the reading end of the pipe as its standard input. It has a process group of its own: a
-// terminal sends Ctrl-C to the whole group of the program, and ffmpeg has to write the frames up to then.
-// Returns an error number, or 0.
-int start(const std::vector<std::string>& words, int input, pid_t& process) {
+// Starts ffmpeg with the reading end of the pipe as its standard input and `output` as kOutput. It has a
+// process group of its own: a terminal sends Ctrl-C to the whole group of the program, and ffmpeg has to
+// write the frames up to then. Returns an error number, or 0.
+int start(const std::vector<std::string>& words, int input, int output, pid_t& process) {
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -53,6 +59,7 @@ int start(const std::vector<std::string>& words, int input, pid_t& process) {
   posix_spawn_file_actions_t actions{};
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, output, kOutput);
   posix_spawnattr_t attributes{};
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -77,11 +84,13 @@ void require_ffmpeg() {
 }
 
 VideoFile::VideoFile(const std::filesystem::path& file, int width, int height, int frames_per_s)
-    : place_(file), width_(width), height_(height) {
+    : place_(file), way_(place_), width_(width), height_(height) {
+  if (!way_.open())
+    throw std::runtime_error(fmt::format("{}: cannot be written ({})", file.string(), std::strerror(errno)));
   std::array<int, 2> ends{-1, -1};
   if (pipe2(ends.data(), O_CLOEXEC) != 0)
     throw std::runtime_error(fmt::format("{}: no pipe to ffmpeg: {}", file.string(), std::strerror(errno)));
-  const int error = start(words_of(place_, width, height, frames_per_s), ends[0], ffmpeg_);
+  const int error = start(words_of(file, width, height, frames_per_s), ends[0], way_.descriptor(), ffmpeg_);
   close(ends[0]);
   pipe_ = ends[1];
   if (error != 0) {
@@ -94,7 +103,6 @@ VideoFile::VideoFile(const std::filesystem::path& file, int width, int height, i
 
 VideoFile::~VideoFile() {
   end();
-  unlink(place_.temporary.c_str());  // after keep() there is no such file
   std::signal(SIGPIPE, before_);
 }
 
@@ -126,7 +134,9 @@ void VideoFile::keep() {
   if (!end())
     throw std::runtime_error(place_.asked.string() +
                              ": ffmpeg has not written the video; its reason is above");
-  std::filesystem::rename(place_.temporary, place_.target);
+  if (!way_.keep())
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written ({})", place_.asked.string(), std::strerror(errno)));
 }
 
 }  // namespace hybrid

@@ -37,6 +37,7 @@ class VideoFile {
   bool end() noexcept;
 
   FilePlace place_;
+  FileOnItsWay way_;
   int width_, height_;
   int pipe_ = -1;
   pid_t ffmpeg_ = -1;
