@@ -148,22 +148,23 @@ HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
 // a pressed node, so the nodes at them form a cone with plane sides. On a plane side the links of a node
 // balance; they pull only where two sides meet.
 HYBRID_MULTIVERSIONED void follow_bounds(float* u, const float* at_bound, const float* lower,
-                                         const float* negated_upper, std::size_t count) noexcept {
+                                         const float* negated_upper, float recedes_m,
+                                         std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; n += kLanes) {
     Float8 x, h;
     load(x, u + n);
     load(h, at_bound + n);
-    const Float8 none = Float8{} + 0.5F * kNoBound, zero{};
+    const Float8 most = Float8{} + recedes_m, zero{};
     if (lower != nullptr) {
       Float8 low;
       load(low, lower + n);
-      x = (((h > zero) & (low > none)) | (low > x)) ? low : x;
+      x = (((h > zero) & (x - low <= most)) | (low > x)) ? low : x;
     }
     if (negated_upper != nullptr) {
       Float8 high;
       load(high, negated_upper + n);
       high = -high;
-      x = (((h < zero) & (high < -none)) | (high < x)) ? high : x;
+      x = (((h < zero) & (high - x <= most)) | (high < x)) ? high : x;
     }
     store(u + n, x);
   }

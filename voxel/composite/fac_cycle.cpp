@@ -259,7 +259,7 @@ void CompositeGrid::cycle(const std::array<bool, 3>& axes) noexcept {
       if (!level.bounded[0] && !level.bounded[1]) continue;
       composite::follow_bounds(level.u[a].data() + level.first_row(),
                                level.at_bound[a].data() + level.first_row(), bound(level, 0), bound(level, 1),
-                               level.floats());
+                               recedes_m_, level.floats());
     }
     const auto smooth = [this, a](std::size_t l) {
       composite::smooth_level(view(l, a));

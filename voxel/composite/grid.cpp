@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace voxel {
 namespace {
@@ -12,6 +13,10 @@ using composite::index;
 
 constexpr int kCoarsest = 5;               // nodes along the longest edge of the coarsest level, at most
 constexpr std::size_t kMaxPressed = 2048;  // voxels in pressed_ at most; press() ignores further ones
+// By how much a bound recedes in one cycle if it is still that of the same contact. A surface that moves by 1
+// recedes by at most kSteepest along the largest component of its normal. A bound on an oblique surface also
+// moves as its node settles on it, by kSettles spacings at most.
+constexpr double kSteepest = std::numbers::sqrt3, kSettles = 0.02;
 
 }  // namespace
 
@@ -202,6 +207,11 @@ glm::dvec3 CompositeGrid::clamp_to_chains(const Index3& voxel, const glm::dvec3&
     at = std::clamp(at, -static_cast<double>(chains_[s][a][0]), static_cast<double>(chains_[s][a][1]));
   }
   return result;
+}
+
+void CompositeGrid::clear_pressed(double moved_m) noexcept {
+  pressed_.clear();
+  recedes_m_ = static_cast<float>(kSteepest * moved_m + kSettles * lattice_.min_spacing_m());
 }
 
 void CompositeGrid::press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept {

@@ -116,8 +116,7 @@ class CompositeGrid {
   }
 
   // ---- rigid surfaces that stand still (rigid_contacts.cpp) ----
-  // `obstacles`: by surface number; they must outlive the grid. Call it again when their address changes.
-  // Allocates.
+  // Allocates. `obstacles`: by surface number; they outlive the grid. Call it again when they have moved.
   void watch_obstacles(std::span<const Obstacle> obstacles);
   // Call it when a surface voxel gets an obstacle.
   void add_obstacle(std::uint32_t surface_number) noexcept;
@@ -135,10 +134,10 @@ class CompositeGrid {
   // Call it before a cycle if the contact has moved. Each displacement along `axis` grows by `share` times
   // itself, but by at most `most_m` (m).
   void extrapolate(std::size_t axis, double share, double most_m) noexcept;
-  // Call both before a cycle. clear_pressed() removes all constraints of the tool's contact; press() adds
-  // that of one voxel of level 0. On each axis along which `normal` (unit vector, into the tissue) has a
-  // component above kAlong, the voxel may not move back beyond the displacement `u` (m).
-  void clear_pressed() noexcept { pressed_.clear(); }
+  // Call both before a cycle. clear_pressed() removes the constraints of the tool, which has moved by
+  // `moved_m` since the last cycle. press() adds that of a voxel of level 0: where a component of `normal`
+  // (unit vector, into the tissue) exceeds kAlong, the voxel may not move back beyond `u` (m).
+  void clear_pressed(double moved_m = 0.0) noexcept;
   void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One FAC cycle over all levels, on these axes.
   void cycle(const std::array<bool, 3>& axes = {true, true, true}) noexcept;
@@ -410,6 +409,7 @@ class CompositeGrid {
   Level before_move_;               // the moving level's state before the move
   std::size_t covering_level_ = 0;  // the first level that covers the whole object
   std::vector<Pressed> pressed_;
+  float recedes_m_ = 0.0F;                     // a bound that recedes further is that of another contact
   std::span<const Obstacle> obstacles_;        // [surface number]; empty: no rigid surface is near
   std::vector<BesideRigid> beside_rigid_;      // surface voxels that have, or had, an obstacle
   std::vector<std::uint8_t> is_beside_rigid_;  // [surface number] 1: in beside_rigid_

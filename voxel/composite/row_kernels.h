@@ -110,9 +110,10 @@ struct BoundSweep {
 void sweep_bounds(const BoundSweep& sweep) noexcept;
 // The largest |u|.
 [[nodiscard]] float largest_size(const float* u, std::size_t count) noexcept;
-// Moves a node onto its bound if `at_bound` marks it as at that bound, or if it lies beyond the bound.
+// Moves a node onto its bound if it lies beyond the bound, or if `at_bound` marks it as at that bound and the
+// bound has receded by at most `recedes_m`.
 void follow_bounds(float* u, const float* at_bound, const float* lower, const float* negated_upper,
-                   std::size_t count) noexcept;
+                   float recedes_m, std::size_t count) noexcept;
 // at_bound: 1 at the lower bound, −1 at the upper bound, else 0.
 void note_at_bound(float* at_bound, const float* u, const float* lower, const float* negated_upper,
                    std::size_t count) noexcept;

@@ -232,7 +232,7 @@ void SoftObject::put_aside(const ToolInBody& tool) noexcept {
 // Sets the bounds of the patches' voxels. A bound stands whether or not its voxel is pressed. If bounds were
 // dropped when coarse levels overshoot, the whole contact would be pressed and released in turns.
 void SoftObject::press_on_grid(const ToolInBody& tool) noexcept {
-  grid_->clear_pressed();
+  grid_->clear_pressed(glm::distance(tool.centre, grid_tool_m_));
   grid_->press_on_obstacles();
   touches_on_grid_.clear();
   for (std::uint32_t n = 0; n < touches_.size(); ++n) {

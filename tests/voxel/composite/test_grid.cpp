@@ -150,6 +150,31 @@ TEST(CompositeGrid, ThePathThereIsForgotten) {
   EXPECT_LT(glm::length(round.force_on_tool_N()), 1e-3 * direct.force_on_tool_N().z);
 }
 
+// A tool holds a voxel sideways and lets go, while another voxel has a bound far from its place. The first
+// voxel then follows its links, not the other bound.
+TEST(CompositeGrid, ANodeThatIsReleasedStays) {
+  const Body body({32, 32, 32}, 0.1, everywhere, below);
+  const Index3 held{16, 16, 31}, beside{20, 16, 31};
+  CompositeGrid grid(*body.lattice, 8);
+  grid.begin(held);
+  const auto cycle = [&](bool sideways) {
+    grid.clear_pressed();
+    grid.press(held, kSpacing * glm::dvec3(0.0, 0.0, -0.3), glm::dvec3(0.0, 0.0, -1.0));
+    grid.press(beside, kSpacing * glm::dvec3(3.0, 0.0, 0.0), glm::dvec3(-1.0, 0.0, 0.0));
+    if (sideways) grid.press(held, kSpacing * glm::dvec3(-0.1, 0.0, -0.3), glm::dvec3(-1.0, 0.0, 0.0));
+    grid.cycle();
+  };
+  for (int n = 0; n < 20; ++n) cycle(true);
+  EXPECT_NEAR(grid.at(held).x, -0.1 * kSpacing, 1e-3 * kSpacing);
+  const double force_N = grid.force_on_tool_N().x;
+  for (int n = 0; n < 20; ++n) {
+    cycle(false);
+    EXPECT_LT(std::fabs(grid.at(held).x), 0.1 * kSpacing) << n;
+    EXPECT_LT(std::fabs(grid.force_on_tool_N().x), std::fabs(force_N)) << n;
+  }
+  EXPECT_NEAR(grid.at(held).x, 0.0, 1e-3 * kSpacing);
+}
+
 // Some or all levels are built before the contact. They are bit for bit the levels that begin() would build.
 TEST(CompositeGrid, LevelsBuiltAheadAreThoseBuiltInTime) {
   const int n = 100;
