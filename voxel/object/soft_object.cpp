@@ -97,7 +97,6 @@ std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
     result->grid_tool_m_ = grid_tool_m_;
     result->contact_energy_ = contact_energy_;
     result->nearest_m_ = nearest_m_;
-    result->grid_cycles_ = grid_cycles_;
     result->grid_ticks_ = grid_ticks_;
     result->axis_waits_ = axis_waits_;
   }

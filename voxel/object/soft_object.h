@@ -439,7 +439,7 @@ class SoftObject {
   };
   std::vector<TouchOnGrid> touches_on_grid_;
   std::array<int, 3> centre_{};                      // of the contact (voxel)
-  std::uint32_t grid_cycles_ = 0, grid_ticks_ = 0;   // since the contact began
+  std::uint32_t grid_ticks_ = 0;                     // since the contact began
   std::array<int, 3> axis_waits_{};                  // how long each axis waits for a cycle, by its force
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // force and tool position of the last cycle
   ContactEnergy contact_energy_;

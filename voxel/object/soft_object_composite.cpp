@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <string>
+#include <utility>
 
 #include "voxel/composite/grid.h"
 #include "voxel/object/soft_object.h"
@@ -20,7 +21,12 @@ namespace {
 constexpr int kLeastMargin = 4;
 // Fraction of the force, and of the tool's motion. An axis with less of both is relaxed in every second tick.
 constexpr double kFelt = 0.3;
-constexpr std::uint32_t kAllAxes = 4;  // number of cycles at the start of a contact that relax all axes
+// A cycle finds the places of pressed voxels along the tool from those of their neighbours before the cycle.
+// So an axis on which a cycle changes the force by more than kStillChanges (share of the force) has another one,
+// up to kCyclesInTick in a tick. A tick that moves a patch has one, because it has much work already.
+constexpr double kStillChanges = 0.01;
+constexpr int kCyclesInTick = 2;
+constexpr std::uint32_t kAllAxes = 4;  // number of ticks at the start of a contact that relax all axes
 // In spacings. A voxel no further than kPressed from the tool is pressed. Tissue on its way back is still
 // felt up to a distance of kOnItsWay.
 constexpr double kPressed = 0.02, kOnItsWay = 0.5;
@@ -30,7 +36,6 @@ constexpr double kWithDepth = 1.7;
 constexpr double kLeastToScale = 0.1, kMostScaled = 1.0;
 constexpr double kLeastDepth = 0.05;  // fraction of the spacing: least depth for the secant stiffness
 constexpr double kNear = 3.0;         // spacings: surface voxels further from the tool are skipped
-constexpr double kMoves = 0.03;       // spacings: a tool that moved further gets a second cycle in the tick
 constexpr double kFlat = 1.5;  // greatest ratio of spacings for which the width of a ball's contact is known
 
 // Call it before a cycle. It extrapolates the displacements to a tool that moved by `way_m` and has displaced
@@ -189,7 +194,7 @@ bool SoftObject::push_out_on_grid(const ToolInBody& tool) noexcept {
     dent_m_ = glm::dvec3(0.0);
     on_grid_ = moved_ever_ = true;
     list_near_on_grid();
-    grid_cycles_ = grid_ticks_ = 0;
+    grid_ticks_ = 0;
     axis_waits_ = {};
     grid_force_N_ = glm::dvec3(0.0);
     contact_energy_.begin();
@@ -325,17 +330,16 @@ std::array<bool, 3> SoftObject::fewer_axes_due() noexcept {
 // Axes to relax in the next cycle, before which the tool moves by `way_m`. An axis that carries little force
 // and along which the tool hardly moves changes little, so it is relaxed in every second tick.
 std::array<bool, 3> SoftObject::axes_due(const glm::dvec3& way_m) noexcept {
-  const bool first_of_tick = contact_work_ == 0;
-  if (first_of_tick) ++grid_ticks_;
+  ++grid_ticks_;
   if (work_share_ < 1.0) return fewer_axes_due();
-  if (grid_cycles_++ < kAllAxes) return {true, true, true};
+  if (grid_ticks_ <= kAllAxes) return {true, true, true};
   std::array<bool, 3> due{};
   const double felt_N = kFelt * glm::length(grid_force_N_), least_m = kFelt * glm::length(way_m);
   int others = 0;
   for (int d = 0; d < 3; ++d) {
     const bool carries = std::abs(grid_force_N_[d]) > felt_N;
-    const bool changes = carries || (first_of_tick && std::abs(way_m[d]) > least_m);
-    const bool turn = first_of_tick && static_cast<std::uint32_t>(others) == grid_ticks_ % 2;
+    const bool changes = carries || std::abs(way_m[d]) > least_m;
+    const bool turn = static_cast<std::uint32_t>(others) == grid_ticks_ % 2;
     due[static_cast<std::size_t>(d)] = changes || turn;
     if (!changes) ++others;
   }
@@ -345,22 +349,32 @@ std::array<bool, 3> SoftObject::axes_due(const glm::dvec3& way_m) noexcept {
 void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
   tool_ = tool;
   if (!on_grid_) return;
-  const bool moved = glm::distance(tool.centre, grid_tool_m_) >= kMoves * lattice_->min_spacing_m();
-  const std::size_t cycles = moved && work_share_ >= 1.0 ? 2 : 1;
-  if (contact_work_ >= cycles * grid_->work_of_cycle() && contact_work_ > 0) {
+  if (contact_work_ > 0) {  // the tick has had its cycles
     settle_on_grid(tool);
     return;
   }
-  if (contact_work_ == 0 && grid_->centre_on(centre_)) list_near_on_grid();
+  const bool patch_moves = grid_->centre_on(centre_);
+  if (patch_moves) list_near_on_grid();
   const double h = lattice_->min_spacing_m();
-  if (nearest_m_ <= kPressed * h) go_along(*grid_, dent_m_, grid_force_N_, tool.centre - grid_tool_m_, h);
-  press_on_grid(tool);
-  grid_->cycle(axes_due(tool.centre - grid_tool_m_));
-  contact_work_ += grid_->work_of_cycle();
-  settle_on_grid(tool);
-  grid_force_N_ = grid_->force_on_tool_N();
-  contact_energy_.account(tool.centre - grid_tool_m_, grid_force_N_, depth_of(dent_m_, grid_force_N_));
-  grid_tool_m_ = tool.centre;
+  const glm::dvec3 way_m = tool.centre - grid_tool_m_;
+  if (nearest_m_ <= kPressed * h) go_along(*grid_, dent_m_, grid_force_N_, way_m, h);
+  std::array<bool, 3> axes = axes_due(way_m);
+  constexpr std::array<bool, 3> kNone{};
+  const int most = patch_moves || work_share_ < 1.0 ? 1 : kCyclesInTick;
+  for (int n = 0; n < most && axes != kNone; ++n) {
+    press_on_grid(tool);
+    grid_->cycle(axes);
+    contact_work_ += grid_->work_of_cycle();
+    settle_on_grid(tool);
+    grid_tool_m_ = tool.centre;
+    const glm::dvec3 before_N = std::exchange(grid_force_N_, grid_->force_on_tool_N());
+    const double changes_N = kStillChanges * glm::length(grid_force_N_);
+    for (int d = 0; d < 3; ++d) {
+      bool& due = axes[static_cast<std::size_t>(d)];
+      due = due && std::abs(grid_force_N_[d] - before_N[d]) > changes_N;
+    }
+  }
+  contact_energy_.account(way_m, grid_force_N_, depth_of(dent_m_, grid_force_N_));
   const bool away = nearest_m_ > kOnItsWay * lattice_->min_spacing_m();
   if (away && glm::length(grid_force_N_) < ContactEnergy::kNoContact_N) on_grid_ = false;
 }
