@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads mesh files, and writes PLY files. write_mesh.h writes other formats and to streams. This is the only
-// part of the project that knows OpenMesh. Every file is prescanned first (prescan.h). Everything that is
-// left out is reported.
+// Reads mesh files, and writes PLY files. write_mesh.h writes other formats, and writes to streams. This is
+// the only part of the project that knows OpenMesh. Every file is prescanned first (prescan.h). Everything
+// that is left out is reported.
 #pragma once
 
 #include <cstdint>

@@ -75,8 +75,8 @@ class TextCursor {
 
 // Removes and returns the first word of `line`; empty if there is none.
 std::string_view take_word(std::string_view& line);
-// The whole word must be a number. A magnitude too large for a double becomes infinite, one too small 0.
-// "nan" and "inf" are numbers.
+// The whole word must be a number. A magnitude too large for a double becomes infinite. A magnitude too small
+// for a double becomes 0. "nan" and "inf" are numbers.
 [[nodiscard]] bool parse_number(std::string_view word, double& value);
 [[nodiscard]] bool parse_integer(std::string_view word, std::int64_t& value);
 
