@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`; sessions do not use it.
+// The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`. Sessions do not use it.
 //
 // It has four parts. ChainMail uses a first-come queue of candidates with their sponsors (Figs 6 to 9).
 // Contact tests a point and six directions on a dense occupancy map (Fig 16). The force comes from the three

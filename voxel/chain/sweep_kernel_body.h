@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Innermost loop of a sweep, in functions of lanes8.h or lanes16.h. For each width, sweep_kernel.cpp includes
-// it in a namespace that uses one of the two. Hence it has neither guard nor namespace.
+// this file in a namespace that uses one of the two. Hence the file has neither guard nor namespace.
 // NOLINTBEGIN(llvm-header-guard)
 
 using RowValues = std::array<Floats, kVectors>;

@@ -145,8 +145,8 @@ HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
 
 // Before a cycle, nodes at a bound move with the bound, and nodes beyond their bound move onto it. Smoothing
 // alone would move them by only one node a sweep. The reason: bounds fall off linearly with the distance from
-// a pressed node, so the nodes at them form a cone with plane sides. On a plane side the links of a node
-// balance; they pull only where two sides meet.
+// a pressed node, so the nodes at a bound form a cone with plane sides. On a plane side the links of a node
+// balance. They pull only where two sides meet.
 HYBRID_MULTIVERSIONED void follow_bounds(float* u, const float* at_bound, const float* lower,
                                          const float* negated_upper, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; n += kLanes) {

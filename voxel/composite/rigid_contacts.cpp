@@ -265,9 +265,9 @@ bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
   return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// By how much a bound falls (m) at most along the shortest chain of links from the box low … high to the
-// place `at` (coordinates). A node of a coarse level stands for all voxels up to `beyond` voxels (half a
-// step) away across the bound's axis, so that many links do not count.
+// The largest fall of a bound (m) along the shortest chain of links from the box low … high to the place `at`
+// (coordinates). A node of a coarse level stands for all voxels up to `beyond` voxels (half a step) away
+// across the bound's axis. So along the other axes the first `beyond` links do not count.
 double CompositeGrid::fall_from(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
                                 const Index3& high, int beyond) const noexcept {
   double fall = 0.0;
@@ -290,7 +290,7 @@ glm::dvec3 CompositeGrid::clamp_to_obstacles(const Index3& voxel, const glm::dve
     for (const std::size_t kind : {std::size_t{0}, std::size_t{1}}) {
       const double sign = kind == 0 ? 1.0 : -1.0;
       const SupportBox& box = supports_[axis][kind];
-      // Quick test: no bound is nearer than the box or greater than its greatest bound.
+      // Quick test: no bound is nearer than the box, or greater than `most`.
       if (!box.any || sign * to >= static_cast<double>(box.most) -
                                        fall_from(at, axis, kind, box.low, box.high, box.beyond))
         continue;

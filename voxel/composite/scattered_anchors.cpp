@@ -10,7 +10,7 @@
 namespace voxel {
 namespace {
 
-// Least resistance of a face, relative to a link between voxels. Faces in their node's plane have it.
+// Least resistance of a face, relative to a link between voxels. A face in its node's plane has this value.
 constexpr float kLeastResistance = 0.01F;
 
 }  // namespace

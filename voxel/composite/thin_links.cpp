@@ -32,7 +32,7 @@ void CoarseMaterial::list_thin_links() {
 
 void CoarseMaterial::add_thin_link(const Index3& voxel, std::size_t d) {
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
-  // Rank of the softer end of the parallel at offset (p, q); 0: there is none.
+  // Rank of the softer end of the parallel link at offset (p, q); 0: there is none.
   const auto rank_at = [&](int p, int q) {
     Index3 from = voxel;
     from[e] += p;

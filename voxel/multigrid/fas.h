@@ -179,7 +179,7 @@ class Multigrid {
   [[nodiscard]] glm::dvec3 residual_of_block(std::size_t block) const noexcept {
     return block_state_[block].frozen_N;
   }
-  // How far its links let a block move, [axis][down, up] (m); down <= 0 <= up.
+  // Interval in which its links let a block move, [axis][down, up] (m); down <= 0 <= up.
   using AdmissibleInterval = std::array<std::array<double, 2>, 3>;
   [[nodiscard]] AdmissibleInterval interval_of_block(std::size_t block,
                                                      const Displacement& state) const noexcept;

@@ -87,7 +87,7 @@ HYBRID_INLINE void narrow_beside(Interval& in, const Around& at, const AxisSprin
   narrow<kUniform, kLimits>(in, at.y_up, at.y_down, s, b, 1, group);
   narrow<kUniform, kLimits>(in, at.z_up, at.z_down, s, b, 2, group);
 }
-// Clamps `wanted` to an interval. An interval can only be empty by rounding; then the voxel stays where it
+// Clamps `wanted` to an interval. An interval can only be empty by rounding. Then the voxel stays where it
 // is.
 HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& now) {
   take_largest(wanted, in.low);

@@ -316,7 +316,7 @@ class SoftObject {
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t shared(std::size_t work) const noexcept;
-  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // what this tick has left of `work`
+  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // part of `work` that is left
   // All arguments and results are displacements from rest. clamp_depth_in_tool() shortens the motion from
   // `now` to `place` so that the voxel gets no deeper into the tool than it is now.
   // project_on_tool_within_limits() finds the least energy on the tool within the links' limits.
@@ -438,9 +438,9 @@ class SoftObject {
     double gap_m;
   };
   std::vector<TouchOnGrid> touches_on_grid_;
-  std::array<int, 3> centre_{};                      // of the contact (voxel)
-  std::uint32_t grid_cycles_ = 0, grid_ticks_ = 0;   // since the contact began
-  std::array<int, 3> axis_waits_{};                  // how long each axis waits for a cycle, by its force
+  std::array<int, 3> centre_{};                     // of the contact (voxel)
+  std::uint32_t grid_cycles_ = 0, grid_ticks_ = 0;  // since the contact began
+  std::array<int, 3> axis_waits_{};  // cycles since each axis was relaxed; with force they count twice
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // force and tool position of the last cycle
   ContactEnergy contact_energy_;
   double nearest_m_ = 0.0;  // smallest gap between a voxel and the tool
