@@ -58,8 +58,8 @@ class HostedSession {
   [[nodiscard]] const std::string& name_of(std::size_t object) const;
 
   // ---- servo ----
-  // Starts the session. Throws hybrid::SceneError if the tool is inside something; it may then be tried at
-  // another position.
+  // Starts the session. Throws hybrid::SceneError if the tool is inside something. Then begin() may be called
+  // again with another position.
   void begin(const glm::dvec3& device_m);
   [[nodiscard]] bool begun() const noexcept { return begun_; }
   // One tick. Call begin() before. The caller has switched flush-to-zero on.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Time-domain passivity: an observer of the energy that a force gives to the hand, and a controller that
-// reduces the force to bound it. After Hannaford & Ryu, IEEE Trans. Robotics & Automation 18 (2002).
+// reduces the force to bound this energy. After Hannaford & Ryu, IEEE Trans. Robotics & Automation 18 (2002).
 #pragma once
 
 #include <cstdint>

@@ -22,7 +22,7 @@ enum class MeshFormat : std::uint8_t { obj, ply, stl, off };
 struct PrescannedFile {
   std::string dialect;                  // the rewritten file, for OpenMesh
   const char* openmesh_extension = "";  // selects OpenMesh's reader
-  bool binary = false;                  // for OpenMesh's STL reader, which must be told
+  bool binary = false;                  // the STL is binary; OpenMesh's reader does not find out
   // One per vertex, in file units. Empty for STL, whose vertices come from OpenMesh as floats.
   std::vector<glm::dvec3> coordinates;
   std::size_t faces = 0;  // number of faces that OpenMesh must find

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measures how far a proxy is from the true constrained optimum. Every proxy error of this project is
+// Measures the distance of a proxy from the true constrained optimum. Every proxy error of this project is
 // measured against this reference. The reference shares nothing with the proxy: it has its own search tree
 // (CGAL), its own closest points (long double, then exact), and its own solution of the optimality
 // conditions.

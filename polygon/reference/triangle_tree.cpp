@@ -27,7 +27,7 @@ float float_above(double x) {
 }
 
 struct Way {
-  glm::dvec3 from, along, inverse;  // the whole way, and one over it
+  glm::dvec3 from, along, inverse;  // `along`: the whole way; `inverse`: 1 / along
   double radius;
 };
 

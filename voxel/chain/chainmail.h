@@ -85,7 +85,7 @@ class ChainMail {
   LazyVector<glm::vec3> stops_;
 };
 
-// The most by which any link of the lattice exceeds its limits (m); for tests.
+// Largest excess of a link of the lattice over its limits (m); for tests.
 double worst_violation(const Lattice& lattice, const Displacement& state);
 
 }  // namespace voxel

@@ -185,7 +185,7 @@ composite::BrickView CompositeGrid::brick_view(std::size_t l) const noexcept {
   return v;
 }
 
-// Finds the loads of all nodes, by strains that follow those of the present displacements.
+// Finds the loads of all nodes, from strains that follow those of the present displacements.
 void CompositeGrid::renew_brick_loads() noexcept {
   if (!has_bricks_) return;
   for (std::size_t l = 0; l <= covering_level_; ++l) {

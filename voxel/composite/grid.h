@@ -142,7 +142,7 @@ class CompositeGrid {
   void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One FAC cycle over all levels, on these axes.
   void cycle(const std::array<bool, 3>& axes = {true, true, true}) noexcept;
-  // Force on the anchors and force on the tool (N), by the balance of the object and of level 0.
+  // Force on the anchors and force on the tool (N), by balance (pressing_force.cpp).
   [[nodiscard]] glm::dvec3 force_on_anchors_N() const noexcept;
   [[nodiscard]] glm::dvec3 force_on_tool_N() const noexcept;
   // Largest excess of a link of level 0 over its limits (m).

@@ -26,10 +26,10 @@ namespace {
 
 using composite::index;
 
-constexpr float kNearby = 3.0F;    // steps of the level: nodes further from their plane get no bound
-constexpr float kSupports = 0.5F;  // steps: nodes nearer to their plane count in clamp_to_supports()
-constexpr float kFollows = 0.5F;   // share of its distance to the bound's force that a load covers in a cycle
-constexpr float kHolds = 1e-3F;    // spacings: a node nearer to its bound is held by it
+constexpr float kNearby = 3.0F;        // steps of the level: nodes further from their plane get no bound
+constexpr float kSupports = 0.5F;      // steps: nodes nearer to their plane count in clamp_to_supports()
+constexpr float kFollows = 0.5F;       // share of the missing force that a load gains in a cycle
+constexpr float kHolds = 1e-3F;        // spacings: a node nearer to its bound is held by it
 constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes in a cycle
 
 }  // namespace

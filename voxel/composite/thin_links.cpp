@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Sheets and rows of single voxels as the levels of a CompositeGrid see them (coarse_material.h). A cell is
-// as stiff as the softest of its voxels, so such tissue fills no cell of its own. Level 0 has its links as
-// the lattice has them. On coarse levels the excess of a link is shared among its cells, as stiffness along
-// the link.
+// as stiff as the softest of its voxels, so such tissue fills no cell of its own. On level 0 the links
+// of such tissue are those of the lattice. On coarse levels the excess of a link is shared among its cells,
+// as stiffness along the link.
 #include <algorithm>
 #include <bit>
 

@@ -189,9 +189,9 @@ HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Flo
   }
 }
 
-// How links are compared with limits. `tightest`: all with the tightest limits; missing neighbours count as
-// neighbours at rest, so that no spring is read. `linked`: those that exist, with the tightest limits.
-// `lanes`: each link with its own limits.
+// Comparison of links with limits. `tightest`: all links, with the tightest limits; missing neighbours count
+// as neighbours at rest, so that no spring is read. `linked`: existing links, with the tightest limits.
+// `lanes`: each link, with its own limits.
 enum class Beyond : std::uint8_t { tightest, linked, lanes };
 
 // Marks the lanes that have a link beyond these limits, by axis. True if there is any.

@@ -5,8 +5,8 @@
 // Tick and thread take turns with the shadow, and neither waits for the other:
 //
 // submit()      the tick hands over the rows that changed since the last submission;
-// relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels where they were
-//               submitted, and packs the changes (the result);
+// relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels at their
+//               submitted places, and packs the changes (the result);
 // apply_near()  later the tick adds the result's rows near the contact: at once, so that no step is felt, or
 //               in parts, while the residual of the parts still to come stays frozen;
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.

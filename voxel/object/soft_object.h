@@ -146,7 +146,7 @@ class SoftObject {
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta` (m): each pressed voxel moves by its component along the voxel's normal.
   void follow(const glm::dvec3& delta) noexcept;
-  // Call it at the start of a tick. It records how deep each touched voxel is in the tool.
+  // Call it at the start of a tick. It records the depth of each touched voxel in the tool.
   void record_depths(const ToolInBody& tool) noexcept;
   // Writes bounds of the tool where the chain kept voxels in the tool. A voxel that does not move may stop
   // the tool but must not push it: the tool may stay as deep as it was when the tick began. A voxel that was

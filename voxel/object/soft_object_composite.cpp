@@ -59,7 +59,7 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool, int margin) {
     return "it has fewer than " + std::to_string(kLeastOnGrid) + " voxels";
   assert(obstacles_.empty() && !moved_ever_);  // obstacles are set only after this call
   if (lattice_->max_spacing_m() > kFlat * lattice_->min_spacing_m()) return "its voxels are not cubes";
-  // A ball touches tissue only where its slope is at most the steepest slope that links allow a surface.
+  // A ball touches tissue only where the ball is at most as steep as links allow a surface to be.
   const double h = lattice_->min_spacing_m();
   double steepest = 0.0;
   for (const LinkMaterial& m : lattice_->materials().subspan(1))

@@ -120,7 +120,7 @@ class Relaxation {
     drift_m_ = furthest_m_ = {};
   }
   [[nodiscard]] bool asleep() const { return asleep_ && !shadow_busy_; }
-  // From now on a shadow relaxes the object (shadow_object.h); this Relaxation only relaxes the neighbourhood
+  // From now on a shadow relaxes the object (shadow_object.h). This Relaxation only relaxes the neighbourhood
   // of the contact. Allocates.
   void leave_to_shadow();
   [[nodiscard]] bool left_to_shadow() const { return left_to_shadow_; }
