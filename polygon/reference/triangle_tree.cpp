@@ -12,7 +12,7 @@ namespace polygon {
 namespace {
 
 constexpr std::uint32_t kLeaf = 2;         // most triangles in a leaf
-constexpr std::size_t kTreeLevels = 64;    // levels; halves of 2^32 triangles need 32
+constexpr std::size_t kTreeLevels = 64;    // 2^32 triangles, halved at each level, need 32
 constexpr double kNoSpeed = 1e-300;        // stands for 0 in a way's direction, whose inverse must be finite
 constexpr double kWidened = 1e-9;          // of a triangle's area: no gap opens between neighbours
 constexpr double kBoxSlack = 1.0 + 1e-12;  // for the roundings of the test against a box

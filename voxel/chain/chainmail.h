@@ -77,7 +77,7 @@ class ChainMail {
   const Lattice& lattice_;
   ChainWave wave_;
   std::uint64_t budget_left_ = 0;
-  // [axis] Margin of this settle(), and of earlier ones with rows that still wait (m).
+  // [axis] Margin of this settle(), and of earlier calls of it whose rows still wait (m).
   std::array<float, 3> margin_{};
   LazyArray<ChainWave::Source> raised_, lowered_;
   bool stopped_by_moving_ = false;  // a moving obstacle has stopped some voxel in this call

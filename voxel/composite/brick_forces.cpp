@@ -59,7 +59,7 @@ HYBRID_INLINE void add_forces(const BrickView& v, const BrickBlocks& blocks, con
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
       const bool covered = k >= v.covered_first[2] && k <= v.covered_last[2] && j >= v.covered_first[1] &&
                            j <= v.covered_last[1];
-      // Forces on the corners above in x of the vector before: [axis][y + 2z].
+      // Forces of the vector before on the upper corners of its cells in x: [axis][y + 2z].
       Float8 before[3][4] = {};
       bool any_before = false;
       for (int o = 0; o < vectors; ++o) {

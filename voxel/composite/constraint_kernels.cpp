@@ -91,8 +91,8 @@ HYBRID_INLINE void sweep_row_down(float* bound, const float* weight, const Limit
   }
 }
 
-// Raises the bounds of one of two rows beside each other by those of the other. `n`: first node of the lower
-// row; the other row is `by` floats further on along d. `up`: raises those of the upper row.
+// Raises the bounds of one of two neighbouring rows by the bounds of the other row. `n`: first node of the
+// lower row. The upper row is `by` floats further on along d. `up`: raises the bounds of the upper row.
 HYBRID_INLINE void raise_row(const BoundSweep& s, std::size_t d, std::size_t n, std::size_t by, bool up) {
   const float* const weight = s.weight[d] + n;
   const LimitOfLinks limit = from_node(up ? s.fall_up[d] : s.fall_down[d], n);

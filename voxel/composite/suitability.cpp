@@ -82,8 +82,8 @@ CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
   return CompositeGrid(lattice, kTrialHalfWidth).try_contacts();
 }
 
-// Trials at places all over the surface: cycles must converge to rest, and a pressed voxel must feel the
-// force that it feels with patches twice as wide.
+// Trials at places all over the surface. Cycles must converge to rest. The force on a pressed voxel must
+// equal that on patches twice as wide, within kMaxForceError.
 CompositeGrid::Suitability CompositeGrid::try_contacts() {
   CompositeGrid wide(lattice_, 2 * kTrialHalfWidth, 2 * kHalfWidth);
   // Differences between neighbours stay below every limit, so that limits play no part.
