@@ -150,7 +150,7 @@ class BoundarySprings {
   LazyArray<std::uint8_t> held_mark_;         // [voxel]
   LazyArray<Support> supported_;              // [voxel]
   LazyArray<std::uint8_t> row_supported_;     // [row] 1: a voxel of it was ever supported
-  std::array<LazyVector<VoxelId>, 2> queue_;  // cells to be renewed: of one level, of the next
+  std::array<LazyVector<VoxelId>, 2> queue_;  // cells to be renewed, of one level and of the next
 };
 
 }  // namespace voxel
