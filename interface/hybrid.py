@@ -30,7 +30,8 @@ __all__ = ["Editable", "Error", "ForceError", "Object", "Session", "TRACE", "ver
 _ABI_VERSION = 2
 
 #: One tick: a row of a trace. device_m, proxy_m: positions (m). force_N: on the hand, after the limits (N);
-#: rigid_N, soft_N: parts of the force before the limits. contact_count: objects in contact; contact_bits: bit n is object n.
+#: rigid_N, soft_N: parts of the force before the limits. contact_count: objects in contact. contact_bits: bit n is
+#: object n.
 #: faults: see Session.fault_texts(). tick_us: processor time (us). hash: of all forces so far.
 TRACE = np.dtype(
     [
