@@ -140,7 +140,7 @@ void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, f
   const auto level = static_cast<std::uint32_t>(l);
   const int along = largest_axis(glm::dvec3(o.normal));
   const float normal = o.normal[along];
-  // The stored force belongs to a node of another level, which stands for another number of voxels.
+  // A force of another level is dropped, because a node of that level stands for another number of voxels.
   ObstacleLoad& load = obstacle_loads_[node.surface];
   if (load.level != level) load = {0.0F, level};
   obstacle_bounds_.push_back({level, node, index(along), normal > 0.0F ? 1.0F : -1.0F,
