@@ -51,8 +51,8 @@ class Claim {
   bool held_;
 };
 
-// Runs `act`, which returns a code, and turns exceptions into codes. Other failures than those of a scene or
-// of memory are `otherwise`. `where`: name of the function, for errors.
+// Runs `act`, which returns a code, and turns exceptions into codes. An exception that concerns neither a
+// scene nor memory gives `otherwise`. `where`: name of the function, for errors.
 template <class Act>
 hybrid_code guarded(const char* where, hybrid_code otherwise, const Act& act) noexcept {
   try {
@@ -119,8 +119,8 @@ hybrid_code in_servo(const char* where, hybrid_session* handle, const Act& act,
       otherwise);
 }
 
-// Sizes (bytes) of the structures when they first appeared: a smaller one is a mistake. A structure that
-// grows keeps its number here, so that programs of that time go on.
+// Sizes (bytes) of the structures in their first version. A smaller size is a mistake. A structure that grows
+// keeps its first size here, so that older programs still run.
 template <class Struct>
 inline constexpr std::uint32_t kFirstSize = 0;
 template <>

@@ -24,7 +24,7 @@ std::string read_text(const std::filesystem::path& file) {
   return text.str();
 }
 
-// The caller is the device, so a driver's device has no place beside it.
+// Refuses a scene with a driver's device, because the caller is the device.
 hybrid::Scene without_driver(hybrid::Scene scene) {
   if (!scene.real_device) return scene;
   throw hybrid::SceneError(

@@ -25,7 +25,7 @@ enum class Relaxation : std::uint8_t { in_call, thread, tick };
 struct HostOptions {
   Relaxation relaxation = Relaxation::in_call;
   std::optional<double> rate_hz{};   // empty: that of the scene
-  std::uint64_t recorded_ticks = 0;  // greatest number of ticks of a recording and of the error's course
+  std::uint64_t recorded_ticks = 0;  // greatest number of ticks for a recording and for measure_error()
   double surfaces_hz = 30.0;         // with Relaxation::thread
   bool surfaces = true;              // keep surfaces for publish()
   bool error = false;                // keep the state at the start for measure_error()
@@ -58,8 +58,8 @@ class HostedSession {
   [[nodiscard]] const std::string& name_of(std::size_t object) const;
 
   // ---- servo ----
-  // Starts the session. Throws hybrid::SceneError if the tool is inside something; it may then be tried at
-  // another position.
+  // Starts the session. Throws hybrid::SceneError if the tool is inside something. Then begin() may be called
+  // again with another position.
   void begin(const glm::dvec3& device_m);
   [[nodiscard]] bool begun() const noexcept { return begun_; }
   // One tick. Call begin() before. The caller has switched flush-to-zero on.
@@ -70,7 +70,7 @@ class HostedSession {
   [[nodiscard]] const hybrid::WorldState& state() const noexcept { return *built_.state; }
   // Hands the surfaces to the reader. Call it only if surfaces() is not null.
   void publish();
-  // Why not all ticks are kept as a recording needs them; empty if they are.
+  // The reason why the session cannot be saved as a recording; empty if it can.
   [[nodiscard]] std::string not_recorded() const;
   // Call it only if not_recorded() is empty. Throws std::runtime_error if the file cannot be written.
   void save_recording(const std::filesystem::path& file) const;
@@ -111,7 +111,7 @@ class HostedSession {
   hybrid::ForceCourse course_;
   std::vector<hybrid::Edit> applied_;
   std::unique_ptr<hybrid::WorldState> at_start_;                 // null without HostOptions::error
-  std::unique_ptr<hybrid::RelaxationThread> relaxation_thread_;  // destroyed before what it reads
+  std::unique_ptr<hybrid::RelaxationThread> relaxation_thread_;  // destroyed before the state that it reads
 };
 
 }  // namespace c_interface

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces for a program that draws: handed from the servo thread to one reader, neither of which waits.
+// Surfaces for a program that draws. The servo thread hands them to one reader, and neither of the two waits.
 #pragma once
 
 #include <cstdint>

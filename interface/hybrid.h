@@ -44,7 +44,7 @@ typedef enum hybrid_code {
   HYBRID_TOO_SMALL = 8,      /* the caller's buffer is too small; the text says which size is needed */
   HYBRID_FULL = 9,           /* a queue or a recording is full */
   HYBRID_REFUSED = 10,       /* the scene is refused; the text has file, line and remedy */
-  HYBRID_NOT_AVAILABLE = 11, /* this session does not have it; the text says why */
+  HYBRID_NOT_AVAILABLE = 11, /* not possible in this session; the text says why */
   HYBRID_FILE = 12,          /* a file cannot be written */
   HYBRID_NO_MEMORY = 13,
   HYBRID_INTERNAL = 14 /* an error of this library; please report it with its text */
@@ -236,9 +236,9 @@ typedef struct hybrid_error {
   double moving_max_jnd, still_max_jnd; /* while the device moves, and while it is still */
 } hybrid_error;
 
-/* [servo] The error of the tissue's force so far, as `hybrid run` reports it: against the same motion, played
- * five times slower, ten times while the device is still. Takes about twice as long as the session. Compares
- * every tick in which something soft was in contact. Needs with_error and recorded_ticks;
+/* [servo] The error of the tissue's force so far, as `hybrid run` reports it. The reference is the same
+ * motion, five times slower, and ten times slower while the device is still. Takes about twice as long as the
+ * session. Compares every tick in which something soft was in contact. Needs with_error and recorded_ticks;
  * HYBRID_NOT_AVAILABLE if nothing can be compared. */
 hybrid_code hybrid_measure_error(hybrid_session* session, hybrid_error* out);
 

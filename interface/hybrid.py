@@ -29,8 +29,9 @@ __all__ = ["Editable", "Error", "ForceError", "Object", "Session", "TRACE", "ver
 
 _ABI_VERSION = 2
 
-#: One tick: the rows of a trace. device_m, proxy_m: positions (m). force_N: on the hand, after its limits (N);
-#: rigid_N, soft_N: its parts before them. contact_count: objects in contact; contact_bits: bit n is object n.
+#: One tick: a row of a trace. device_m, proxy_m: positions (m). force_N: on the hand, after the limits (N);
+#: rigid_N, soft_N: parts of the force before the limits. contact_count: objects in contact. contact_bits: bit n is
+#: object n.
 #: faults: see Session.fault_texts(). tick_us: processor time (us). hash: of all forces so far.
 TRACE = np.dtype(
     [
@@ -49,7 +50,7 @@ TRACE = np.dtype(
     ]
 )
 
-_ROW = np.dtype((np.record, TRACE))  # its rows have attributes
+_ROW = np.dtype((np.record, TRACE))  # a row whose fields are attributes
 _Row = ctypes.c_uint32 * (TRACE.itemsize // 4)  # memory of a row; its first word is the size
 
 _RELAXATIONS = {"in-call": 0, "thread": 1, "tick": 2}
@@ -186,7 +187,7 @@ def _need(code: int) -> None:
 
 
 def _place(position: ArrayLike) -> ctypes.Array:
-    """A position for the library. An array of ctypes, because its address costs less than that of one of numpy."""
+    """A position for the library: a ctypes array, whose address takes less time to get than a numpy array's."""
     shape = np.shape(position) if not isinstance(position, (tuple, list)) else (len(position),)
     if shape != (3,):
         raise Error("HYBRID_BAD_VALUE", f"a position has the shape {shape}; pass three numbers x, y, z in meters")
@@ -338,13 +339,13 @@ class Session:
 
     def __del__(self) -> None:
         if getattr(self, "_handle", None):
-            _library.hybrid_close(self._handle)  # an error if it was closed, which is well
+            _library.hybrid_close(self._handle)  # fails harmlessly if the session was closed before
 
     # ---- ticks ----
 
     def begin(self, position: ArrayLike) -> None:
-        """Starts with the tool at a position (m), outside everything rigid. The first tick() or play() does it with
-        its first position, if it was not called."""
+        """Starts with the tool at a position (m), outside everything rigid. Without this call, the first tick() or
+        play() starts at its own first position."""
         at = _place(position)
         _need(_library.hybrid_begin(self._handle, at))
         self._begun = True
@@ -440,8 +441,8 @@ class Session:
         _need(_library.hybrid_save_recording(self._handle, os.fsencode(file)))
 
     def measure_error(self) -> ForceError:
-        """The error of the tissue's force so far, against the same motion played five times slower, ten
-        times while the device is still. Takes about twice as long as the session. Needs record= and error=True."""
+        """The error of the tissue's force so far. The reference is the same motion, five times slower, and ten times
+        slower while the device is still. Takes about twice as long as the session. Needs record= and error=True."""
         found = _ForceError()
         _need(_library.hybrid_measure_error(self._handle, ctypes.byref(found)))
         return ForceError(**{name: getattr(found, name) for name, _ in _ForceError._fields_[1:]})

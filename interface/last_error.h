@@ -8,7 +8,7 @@
 
 namespace c_interface {
 
-// Each keeps a text for the calling thread and returns `code`.
+// Both functions keep a text for the calling thread and return `code`.
 // For use in a tick: allocates nothing. Both texts must live for ever. The error's text is "where: what".
 hybrid_code fail(hybrid_code code, const char* where, const char* what) noexcept;
 // Allocates.

@@ -13,7 +13,7 @@
 namespace c_interface {
 namespace {
 
-// Every handle that was given out, so that none is lost memory.
+// Every handle that was given out. The list keeps them reachable, so that none counts as leaked memory.
 std::mutex handles_lock;
 std::forward_list<hybrid_session>& handles() {
   static auto* const all = new std::forward_list<hybrid_session>;  // never destroyed: threads may outlive it
@@ -53,7 +53,7 @@ hybrid_code open(const char* where, const hybrid_options* options, hybrid_sessio
   *session = nullptr;
   HostOptions host;
   if (const hybrid_code code = read_options(where, options, host); code != HYBRID_OK) return code;
-  // Host programs differ in how they treat denormal numbers; scenes must not.
+  // Host programs treat denormal numbers in different ways. The result of a scene must not depend on that.
   const hybrid::ScopedFlushToZero flushed;
   return guarded(where, HYBRID_REFUSED, [&] {
     *session = new_handle(std::make_unique<HostedSession>(source(), host));

@@ -15,7 +15,7 @@ enum class DeviceFault : std::uint8_t {
   none,
   lost,            // no answer: unplugged, switched off, communication error
   not_calibrated,  // positions are not valid yet
-  warm_motors,     // the driver has switched the motors off, or will, until they are cooler
+  warm_motors,     // too warm: the driver has switched the motors off, or will do so
   force_limit,     // the driver refused a force as too large
   velocity_limit,  // the driver switched the motors off because the tool moves too fast
   late,            // set by the loop: the last force was held longer than allowed

@@ -38,8 +38,8 @@ void observe(const PassivityOptions& options, PassivityState& state, const glm::
   const double work = glm::dot(state.last_N, way);
   state.given_J += work;
   state.worst_tick_J = std::max(state.worst_tick_J, std::abs(work));
-  // A step longer than reach_m() may exceed the guarantee. The excess is then added to worst_tick_J; else the
-  // force would never recover.
+  // A step longer than reach_m() may exceed the guarantee. The excess is then added to worst_tick_J.
+  // Otherwise the force would never recover.
   state.worst_tick_J = std::max(state.worst_tick_J, state.given_J - kSpare_J);
   state.most_given_J = std::max(state.most_given_J, state.given_J);
 }

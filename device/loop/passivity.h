@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Time-domain passivity: an observer of the energy that a force gives to the hand, and a controller that
-// reduces the force to bound it. After Hannaford & Ryu, IEEE Trans. Robotics & Automation 18 (2002).
+// reduces the force to bound this energy. After Hannaford & Ryu, IEEE Trans. Robotics & Automation 18 (2002).
 #pragma once
 
 #include <cstdint>
@@ -49,7 +49,7 @@ struct PassivityState {
 // again.
 //   - given_J <= 0, while the tool moves out: the share is limited so that the stored energy lasts until the
 //     tool is back where the force began, as with a spring. So a wall that the sampled loop cannot hold is
-//     felt as a softer one that it can hold. Before any energy is stored, the force has a small limit.
+//     felt as a softer wall. Before any energy is stored, the force has a small limit.
 //   - given_J > 0: the tool might turn and move as far as the bound allows. The force is limited so that it
 //     would then give no more than worst_tick_J − given_J. The force is zero if the tool's last step was
 //     along it.

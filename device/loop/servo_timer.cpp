@@ -48,7 +48,7 @@ std::string take_servo_priority() {
   int failed = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
   rlimit limit{};
   if (failed == EPERM && getrlimit(RLIMIT_RTPRIO, &limit) == 0 && limit.rlim_cur > 0) {
-    // The user may be allowed some real-time priority, but not this much.
+    // The user may be allowed only a lower real-time priority.
     parameters.sched_priority = static_cast<int>(std::min<rlim_t>(limit.rlim_cur, kServoPriority));
     failed = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
   }

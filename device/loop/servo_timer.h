@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Paces a loop at a fixed rate on the monotonic clock, and reports how late each wake-up was.
+// Paces a loop at a fixed rate on the monotonic clock, and reports the delay of each wake-up.
 #pragma once
 
 #include <cstdint>

@@ -358,7 +358,7 @@ class Finder {
   FileColumns out_;
 };
 
-// Finds the decimal mark: the first clear number in a column that is read, from line `first` on, decides.
+// Finds the decimal mark, by the first unambiguous number from line `first` on in a column that is read.
 void find_decimal_mark(const MeasuredFile& measured, std::size_t first, FileColumns& columns) {
   LineReader reader(measured.file);
   std::vector<std::string_view> fields;

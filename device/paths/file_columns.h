@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The columns of a text file: which quantity each holds, in which unit, and how rows are written. Paths and
-// measured forces share this reader.
+// The columns of a text file: their quantities and units, and the notation of the rows. Paths and measured
+// forces share this reader.
 #pragma once
 
 #include <array>
@@ -44,13 +44,14 @@ struct FileColumns {
   std::vector<std::string> notes;
 };
 
-// Finds the columns: those of `measured.columns` if it is not empty, else those of the heading, with a row of
-// units below it. Without a heading they follow from a comment, or from their number. `line` is the first
-// line of the file, and afterwards the first row. Refuses ambiguous columns (PathError).
+// Finds the columns. They are those of `measured.columns` if it is not empty, otherwise those of the heading,
+// which may have a row of units below it. Without a heading the columns follow from a comment, or from their
+// number. `line` is the first line of the file, and afterwards the first row. Refuses ambiguous columns
+// (PathError).
 FileColumns find_file_columns(const MeasuredFile& measured, LineReader& reader, std::string_view& line);
 
-// Sets `fields` to those of a row; empty for a row of separators alone. Throws PathError: too few fields, or
-// fields beyond the named columns.
+// Sets `fields` to the fields of a row; empty for a row of separators alone. Throws PathError for too few
+// fields, or for fields beyond the named columns.
 void split_row(const LineReader& reader, const FileColumns& columns, std::string_view line,
                std::vector<std::string_view>& fields);
 

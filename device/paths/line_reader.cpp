@@ -35,9 +35,9 @@ constexpr std::array<OtherFormat, 7> kOtherFormats{
      {"\xD0\xCF\x11\xE0"sv, "is a workbook (.xls); export its table as CSV"sv},
      {"version https://git-lfs"sv, "is a Git LFS pointer; fetch the file itself (git lfs pull)"sv}}};
 
-// The length in bytes of the character of UTF-8 (RFC 3629) at `at`. 0: the bytes there are none, or one that
-// may not be printed as it is: a control character, a separator of lines, or a mark that turns the direction
-// of text.
+// The length in bytes of the character of UTF-8 (RFC 3629) at `at`. 0 if the bytes are no such character, or
+// one that may not be printed as it is. Those are control characters, separators of lines, and marks that
+// turn the direction of text.
 std::size_t printable_at(std::string_view text, std::size_t at) {
   constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};  // [length] code point
   const auto byte = [&](std::size_t i) -> std::uint32_t { return static_cast<unsigned char>(text[at + i]); };

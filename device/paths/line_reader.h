@@ -12,8 +12,8 @@
 
 namespace device {
 
-// Reads lines that end with LF, CR LF or CR alone. Throws PathError: no such file, unreadable, truncated, not
-// text, or UTF-16 or UTF-32 by its byte-order mark.
+// Reads lines that end with LF, CR LF or CR alone. Throws PathError if the file is missing, unreadable,
+// truncated or not text, or if its byte-order mark is that of UTF-16 or UTF-32.
 class LineReader {
  public:
   explicit LineReader(const std::filesystem::path& file);
@@ -24,7 +24,8 @@ class LineReader {
   ~LineReader();
 
   // Sets `line` to the next line that is neither blank nor a comment, without its end; false at the end of
-  // the file. `line` is valid until the next call. A comment begins with '#' or '%'; the last one is kept.
+  // the file. `line` is valid until the next call. A comment begins with '#' or '%'. The last comment is
+  // kept.
   bool next(std::string_view& line);
   // Throws PathError "file:line: what"; by default at the current line.
   [[noreturn]] void refuse(const std::string& what, std::size_t line = 0) const;

@@ -76,8 +76,8 @@ class Path {
   [[nodiscard]] virtual const std::vector<std::string>& notes() const noexcept = 0;
 };
 
-// Throws PathError: speed not positive, no points, values not finite, CSV missing or malformed (file:line),
-// time running backwards.
+// Throws PathError if the speed is not positive, there are no points, a value is not finite, the CSV is
+// missing or malformed (file:line), or time runs backwards.
 std::unique_ptr<Path> make_path(const PathDescription& description);
 
 }  // namespace device

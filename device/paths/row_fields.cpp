@@ -33,7 +33,8 @@ std::size_t minus_at(std::string_view field, std::size_t at) {
 // The length in bytes of the grouping mark at `at`; 0: there is none. `mark` is the decimal mark.
 std::size_t grouping_at(std::string_view field, std::size_t at, DecimalMark mark) {
   const std::string_view other = mark == DecimalMark::point ? ","sv : "."sv;
-  // The other mark, apostrophes, a blank, and in UTF-8 the no-break, narrow no-break and thin spaces.
+  // The other one of point and comma, apostrophes, a blank, and in UTF-8 the no-break, narrow no-break and
+  // thin spaces.
   for (const std::string_view parts :
        {other, "'"sv, " "sv, "\xE2\x80\x99"sv, "\xC2\xA0"sv, "\xE2\x80\xAF"sv, "\xE2\x80\x89"sv}) {
     if (field.substr(at).starts_with(parts)) return parts.size();

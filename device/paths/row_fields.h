@@ -34,8 +34,9 @@ ShownMark shown_mark(std::string_view field);
 // Could the field be a number, with either decimal mark?
 bool looks_like_number(std::string_view field);
 
-// The number in a field. It may have groups of three digits, separated by the other mark, an apostrophe or a
-// blank. Empty: no number, or not finite. A long double holds nanoseconds since 1970 exactly.
+// The number in a field. It may have groups of three digits, separated by the other one of point and comma,
+// an apostrophe or a blank. Empty: no number, or not finite. A long double holds nanoseconds since 1970
+// exactly.
 template <typename Real>
 std::optional<Real> number_in(std::string_view field, DecimalMark mark);
 extern template std::optional<double> number_in<double>(std::string_view field, DecimalMark mark);

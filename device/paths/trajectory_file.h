@@ -45,9 +45,9 @@ struct MeasuredTrajectory {
   std::vector<std::string> notes;  // assumptions, gaps, repeated times
 };
 
-// A sample that repeats the time of the sample before it replaces that sample. Throws PathError with file,
-// line and remedy: no file, missing or ambiguous columns, unknown units, no rows or too many, a field that is
-// no number, time running backwards, more than a day.
+// A sample that repeats the time of the sample before it replaces that sample. Throws PathError, with
+// file, line and remedy, for a missing file, missing or ambiguous columns, unknown units, no rows or too
+// many, a field that is no number, time that runs backwards, or more than a day.
 MeasuredTrajectory read_measured(const MeasuredFile& measured);
 
 // Sets `before`, the index of the sample before t_s, and `share`, the fraction of the time step to the next

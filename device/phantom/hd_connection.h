@@ -38,8 +38,8 @@ struct HdOpenOptions {
 
 class HdConnection {
  public:
-  // Throws DeviceError with the remedy: no library, no device, no licence, no scheduler. A device that is not
-  // calibrated can be opened. A calibration that needs no action of the user is done at once.
+  // Throws DeviceError, with the remedy, if there is no library, device, licence or scheduler. A device that
+  // is not calibrated can be opened. A calibration that needs no action of the user is done at once.
   explicit HdConnection(const HdOpenOptions& options);
   ~HdConnection();
   HdConnection(const HdConnection&) = delete;

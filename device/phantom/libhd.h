@@ -98,10 +98,10 @@ struct HdLibrary {
   std::string file;  // path or name with which it was loaded
 };
 
-// Loads `file`. If that is empty, loads the file that the environment variable HYBRID_LIBHD names; without
-// it, libHD.so, libHD.so.3.4 or libHD.so.3.0. If a named file does not load, no other file is tried. The
-// library stays loaded to the end of the program, because the driver's threads run in it. Throws DeviceError:
-// no library found, a dependency missing, a function missing.
+// Loads `file`. If `file` is empty, loads the file that the environment variable HYBRID_LIBHD names. Without
+// that variable, loads libHD.so, libHD.so.3.4 or libHD.so.3.0. If a named file does not load, no other file
+// is tried. The library stays loaded to the end of the program, because the driver's threads run in it.
+// Throws DeviceError: no library found, a dependency missing, a function missing.
 HdLibrary load_libhd(const std::filesystem::path& file = {});
 
 }  // namespace device

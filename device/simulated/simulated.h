@@ -64,9 +64,9 @@ struct SimulatedDeviceOptions {
 inline constexpr int kMaxDelayTicks = 64;
 
 // Makes a device with the mechanics of tool_mechanics.h. The tool starts at rest at the path's first
-// position. Throws std::invalid_argument: no path, neither mechanism nor hand has a mass, a delay out of
-// range, a value below 0 or not finite (max_force_N, max_stiffness_N_per_m, motor_slew_N_per_s and
-// workspace_m may be infinite).
+// position. Throws std::invalid_argument if there is no path, neither mechanism nor hand has a mass, a delay
+// is out of range, or a value is below 0 or not finite (max_force_N, max_stiffness_N_per_m,
+// motor_slew_N_per_s and workspace_m may be infinite).
 std::unique_ptr<HapticDevice> make_simulated_device(const SimulatedDeviceOptions& options,
                                                     std::shared_ptr<const Path> path);
 // Makes a simulated device with the values of a model. The ideal device follows its path, whatever the force

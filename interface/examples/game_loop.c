@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * A game: a servo thread calls the ticks at the scene's rate, and the game's loop draws at 60 Hz.
  *   game_loop SCENE.toml [SECONDS]    2 s by default; the tool goes up and down over the middle of the scene
- * Neither thread waits for the other. A real game reads the tool's position from a driver and writes the
- * force to it; gives the servo thread real-time priority (pthread_setschedparam); and draws with its own
- * engine. Build: cc game_loop.c $(pkg-config --cflags --libs hybrid) -lm -pthread -o game_loop */
+ * Neither thread waits for the other. A real game reads the tool's position from a driver, and writes the
+ * force to that driver. It gives the servo thread real-time priority (pthread_setschedparam), and draws with
+ * its own engine. Build: cc game_loop.c $(pkg-config --cflags --libs hybrid) -lm -pthread -o game_loop */
 #define _POSIX_C_SOURCE 200809L
 #include <hybrid.h>
 #include <math.h>
@@ -77,7 +77,7 @@ static void* servo(void* argument) {
   return NULL;
 }
 
-/* What a game would draw: the surfaces that changed since the frame before. Returns how many did. */
+/* Takes the surfaces that changed since the frame before, as a game would draw them. Returns their number. */
 static unsigned draw(game* g, double** vertices_m, const hybrid_object* objects) {
   hybrid_snapshot snapshot = {.size = sizeof snapshot};
   unsigned drawn = 0;

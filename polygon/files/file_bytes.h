@@ -11,8 +11,8 @@ namespace polygon {
 
 // The reason why a file that begins with these bytes is no data file, and the remedy, in words for a message.
 // 64 bytes are enough. Empty for a data file. Git LFS leaves pointers in place of files that were not
-// fetched. Servers may send a web page instead of a file. Other programs' files get a name that they do not
-// have. gzip is a data file here.
+// fetched. Servers may send a web page instead of a file. A file of another format may have been renamed.
+// gzip counts as a data file.
 std::string_view other_kind(std::string_view first_bytes);
 
 // `packed`: the file must be gzip. Throws MeshError if the file is missing, not a regular file, unreadable,

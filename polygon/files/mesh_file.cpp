@@ -33,9 +33,8 @@ class SoupImporter final : public io::BaseImporter {
     face_begin.reserve(faces + 1);
   }
   std::vector<glm::dvec3> points;
-  std::vector<std::uint32_t> corners;  // of all faces, concatenated
-  std::vector<std::uint32_t> face_begin{
-      0};  // [face] where its corners start; the last entry is the end of all
+  std::vector<std::uint32_t> corners;        // of all faces, concatenated
+  std::vector<std::uint32_t> face_begin{0};  // [face] start of its corners; the last entry is the end of all
 
   using VH = OpenMesh::VertexHandle;
   using HH = OpenMesh::HalfedgeHandle;

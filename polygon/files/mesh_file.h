@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads mesh files, and writes PLY files. write_mesh.h writes other formats and to streams. This is the only
-// part of the project that knows OpenMesh. Every file is prescanned first (prescan.h). Everything that is
-// left out is reported.
+// Reads mesh files, and writes PLY files. write_mesh.h writes other formats, and writes to streams. This is
+// the only part of the project that knows OpenMesh. Every file is prescanned first (prescan.h). Everything
+// that is left out is reported.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +32,8 @@ struct MeshFile {
 
 // OBJ, PLY, STL and OFF, each also as .gz; the extension is case-insensitive. Non-manifold faces are kept.
 // Elements that cannot be kept (vertices that are not finite, indices out of range) are left out and
-// reported. Throws MeshError: missing, unreadable, unknown format, truncated, no triangle left, larger than
-// max_bytes.
+// reported. Throws MeshError if the file is missing, unreadable, of unknown format, truncated or larger than
+// max_bytes, or if no triangle is left.
 MeshFile load_mesh(const std::filesystem::path& file, const MeshFileOptions& options = {});
 
 // Writes binary PLY, with coordinates in meters. The file is written under a temporary name beside `file` and

@@ -317,8 +317,8 @@ PrescannedFile prescan_stl(const std::filesystem::path& file, std::span<char> ra
   std::string_view first_line = without_byte_order_mark(bytes.substr(0, 256));
   const std::string_view first_word = take_word(first_line);
   const bool says_solid = first_word == "solid" || first_word == "SOLID";
-  // Many binary files begin with 'solid' too, so the size decides first. Where it is wrong, the bytes decide:
-  // the header or the number of facets of a binary file holds a byte of value 0, and text holds none.
+  // Many binary files begin with 'solid' too, so the size decides first. If the size does not fit, the bytes
+  // decide. The header or the number of facets of a binary file holds a byte of value 0. Text holds none.
   const bool has_zero = bytes.substr(0, kStlHeader).find('\0') != std::string_view::npos;
   if (says_solid && expected != bytes.size() && !has_zero) {
     prescan_stl_text(file, plain_text(file, raw), prescanned);

@@ -22,7 +22,7 @@ enum class MeshFormat : std::uint8_t { obj, ply, stl, off };
 struct PrescannedFile {
   std::string dialect;                  // the rewritten file, for OpenMesh
   const char* openmesh_extension = "";  // selects OpenMesh's reader
-  bool binary = false;                  // for OpenMesh's STL reader, which must be told
+  bool binary = false;                  // the STL is binary; OpenMesh's reader does not find out
   // One per vertex, in file units. Empty for STL, whose vertices come from OpenMesh as floats.
   std::vector<glm::dvec3> coordinates;
   std::size_t faces = 0;  // number of faces that OpenMesh must find
@@ -75,8 +75,8 @@ class TextCursor {
 
 // Removes and returns the first word of `line`; empty if there is none.
 std::string_view take_word(std::string_view& line);
-// The whole word must be a number. A magnitude too large for a double becomes infinite, one too small 0.
-// "nan" and "inf" are numbers.
+// The whole word must be a number. A magnitude too large for a double becomes infinite. A magnitude too small
+// for a double becomes 0. "nan" and "inf" are numbers.
 [[nodiscard]] bool parse_number(std::string_view word, double& value);
 [[nodiscard]] bool parse_integer(std::string_view word, std::int64_t& value);
 

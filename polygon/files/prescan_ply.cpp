@@ -253,7 +253,7 @@ class Body {
 };
 
 void read_vertices(const Element& element, Body& body, std::vector<glm::dvec3>& coordinates) {
-  // [property] which coordinate it is, 0 to 2; -1 if it is none.
+  // [property] its coordinate, 0 to 2; -1 if it is none.
   std::vector<int> axis(element.properties.size(), -1);
   for (std::size_t p = 0; p < axis.size(); ++p) {
     const Property& property = element.properties[p];

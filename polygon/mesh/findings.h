@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tallies what a check finds or a repair changes: how often and where.
+// Tallies of the findings of a check, or of the changes of a repair: their number and their place.
 #pragma once
 
 #include <cstddef>

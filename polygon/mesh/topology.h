@@ -70,7 +70,7 @@ class EdgeTable {
   [[nodiscard]] bool empty() const { return uses_.empty(); }
 
  private:
-  std::vector<std::size_t> starts_;  // [point] where the sides begin whose low end is this point
+  std::vector<std::size_t> starts_;  // [point] start of the sides whose low end is this point
   std::vector<Use> uses_;
 };
 

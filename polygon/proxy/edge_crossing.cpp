@@ -56,8 +56,8 @@ EdgeCrossing cross_edge(const CrossableEdges& edges, const CrossableEdges::Side&
   const glm::dvec3 &a = edges.plane.normal, &b = side.plane.normal;
   EdgeCrossing crossing;
   crossing.end = goal + (side.plane.offset - glm::dot(b, goal)) * b;
-  // Goes along the side's plane, across the edge, up to the element's plane. A sum of both normals from the
-  // goal would be wrong: for nearly parallel planes its rounding would violate them.
+  // `top` lies in the side's plane, at the place across the edge where the element's plane begins. A weighted
+  // sum of both normals, added to the goal, would be rounded, and would violate nearly parallel planes.
   const glm::dvec3 across = glm::normalize(a - b + side.bend * b);
   crossing.top =
       crossing.end + ((edges.plane.offset - glm::dot(a, crossing.end)) / glm::dot(a, across)) * across;

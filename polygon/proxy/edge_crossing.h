@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Crossing of nearly flat edges. A ball pressed into a convex tessellated surface has a local minimum on each
-// of several triangles. Which one it is in would depend on the path, and the hand would feel a catch at every
-// edge. So the proxy crosses to a neighbouring minimum that is nearer to the goal if only a nearly flat edge
-// lies between. At a sharp edge it stays, because there the hand itself has to go around.
+// of several triangles. The path would decide which of these minima holds the ball, and the hand would feel a
+// catch at every edge. So the proxy crosses to a neighbouring minimum that is nearer to the goal if only a
+// nearly flat edge separates the two. At a sharp edge the proxy stays, because a hand has to go around it.
 #pragma once
 
 #include <array>

@@ -10,10 +10,10 @@ namespace polygon {
 namespace {
 
 constexpr int kMaxExchanges = 64;  // planes that are added to the subset in turn, at most
-// Planes closer to parallel than this count as one: the sine of the angle between one normal and the span of
-// the others. Their intersection would be rounding error.
+// Sine of the angle between one normal and the span of the others. Below this value the planes count as
+// parallel, because their intersection would be rounding error.
 constexpr double kParallel = 1e-9;
-// Relative to the distance from the target: a smaller violation counts as satisfied. Three planes at a blunt
+// A violation below this fraction of the distance from the target counts as none. Three planes at a blunt
 // corner cannot be solved more exactly.
 constexpr double kRounding = 1e-12;
 
@@ -153,8 +153,8 @@ PlaneMinimum minimise_on_planes(const glm::dvec3& target, const Metric& metric,
       }
     }
     if (best_subset.count == 0) {
-      // If the plane is parallel to the active ones and its violation is within their angle, it counts as
-      // satisfied.
+      // A plane that is parallel to the active ones counts as satisfied if its violation is at most kParallel
+      // of the distance from the target.
       result.feasible = depth <= tolerance + kParallel * glm::length(way);
       return result;
     }

@@ -99,10 +99,10 @@ std::span<Neighbourhood::Violation> Neighbourhood::violated(const glm::dvec3& fr
 SeparatingPlane separating_plane(const RigidSurface& surface, std::uint32_t element, const glm::dvec3& view,
                                  double radius) noexcept {
   const NearPoint near = surface.closest(element, view);
-  if (!(near.distance > 0.0)) return {};  // always satisfied; neighbouring elements decide
+  if (!(near.distance > 0.0)) return {};  // a plane that all points satisfy; other elements decide
   const glm::dvec3 normal = (view - near.point) / near.distance;
-  // The offset comes from the element's support and not from the closest point. So near to the surface the
-  // normal has rounding error, which over a long triangle exceeds the distance.
+  // The offset comes from the element's support and not from the closest point. Close to the surface the
+  // normal has a rounding error, which over a long triangle exceeds the distance.
   const double support = surface.support(element, normal);
   return {normal, (std::isfinite(support) ? support : glm::dot(normal, near.point)) + radius};
 }

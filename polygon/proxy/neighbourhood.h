@@ -76,8 +76,8 @@ class Neighbourhood {
   }
   void set_plane(std::uint32_t i, const SeparatingPlane& plane) noexcept;
 
-  // Makes all planes anew that `view` violates, although `view` touches nothing. Needed when the proxy did
-  // not get there by a step that the planes allowed.
+  // Makes all planes anew that `view` violates, although `view` touches nothing. Needed if the proxy reached
+  // `view` by another way than a step that the planes allowed.
   void refresh_planes(const RigidSurface& surface, const glm::dvec3& view, double radius,
                       double rounding) noexcept;
 

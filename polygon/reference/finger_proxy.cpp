@@ -78,8 +78,9 @@ class Constraints {
   double slack_m_;
 };
 
-// Moves `at` towards `next` until it is within the gap of a triangle. Looks ahead by the gap, or a goal on a
-// triangle would put the proxy there. Returns the contact, if there is one.
+// Moves `at` towards `next` until it is within the gap of a triangle. The search goes beyond `next` by the
+// gap. Otherwise a goal on a triangle would put the proxy on the triangle. Returns the contact, if there is
+// one.
 SweptHit advance(const TriangleTree& tree, double radius, double gap, const glm::dvec3& next,
                  glm::dvec3& at) {
   const glm::dvec3 way = next - at;
@@ -94,7 +95,7 @@ SweptHit advance(const TriangleTree& tree, double radius, double gap, const glm:
   return hit;
 }
 
-// The proxy goes on from `at`. True: nothing was in the way to the goal.
+// Does one pass from `at`. True: nothing was in the way to the goal.
 bool pass(const TriangleTree& tree, double radius, double gap, const glm::dvec3& goal, glm::dvec3& at,
           std::uint32_t& sweeps) {
   Constraints constraints(kSlack * gap);

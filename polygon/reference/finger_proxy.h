@@ -6,8 +6,8 @@
 //
 // The proxy, a ball, moves straight to the goal until it meets a triangle. The plane of contact becomes a
 // constraint. The next goal is the nearest place to the device that all constraints allow, at most three at a
-// time. One pass ends when the proxy reaches such a goal, or meets a fourth triangle. The paper repeats this
-// as far as the servo loop has time: the libraries do one pass in a tick.
+// time. One pass ends when the proxy reaches such a goal, or meets a fourth triangle. The paper repeats
+// passes while the servo loop has time. The libraries do one pass in a tick.
 #pragma once
 
 #include <cstdint>

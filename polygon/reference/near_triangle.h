@@ -12,8 +12,8 @@
 
 namespace polygon {
 
-// A triangle in coordinates relative to a nearby origin. There long double resolves the small differences
-// that matter.
+// A triangle in coordinates relative to a nearby origin. In these coordinates long double resolves the small
+// differences that matter.
 struct NearTriangle {
   std::uint32_t id = 0;
   std::array<FineVec, 3> corner;  // relative to the origin; exact or nearly so

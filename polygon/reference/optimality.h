@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measures how far a proxy is from the true constrained optimum. Every proxy error of this project is
+// Measures the distance of a proxy from the true constrained optimum. Every proxy error of this project is
 // measured against this reference. The reference shares nothing with the proxy: it has its own search tree
 // (CGAL), its own closest points (long double, then exact), and its own solution of the optimality
 // conditions.
@@ -44,9 +44,10 @@ class OptimalityReference {
   // Radius: a radius below the skin (1e-9 of the mesh's size) is replaced by the skin. The skin stands for
   // the limit r → 0+, in which each point is on a definite side of a sheet.
   //
-  // Reach: a point across the surface from the proxy does not count. The straight path to it, or a path that
-  // arches over a convex edge, must not cross a triangle. The goal itself is optimal, at any distance, if the
-  // ball can go straight to it. If several points are at the same distance, the first one found is returned.
+  // Reach: a point across the surface from the proxy does not count. The straight path from the proxy to the
+  // point, or a path that arches over a convex edge, must not cross a triangle. The goal itself is optimal,
+  // at any distance, if the ball can go straight to the goal. Of several equally near points the first one
+  // found is returned.
   //
   // Bounds: `search_radius_m` bounds the search, and the amount of work is bounded too. So for a proxy that
   // is many features away from the optimum, a point further away may be returned. Then error_m is too large.

@@ -38,7 +38,7 @@ struct SearchCell {
   bool operator<(const SearchCell& other) const { return nearest > other.nearest; }
 };
 
-// One query. Coordinates are relative to the proxy. There long double resolves the small differences that
+// One query. Coordinates are relative to the proxy, so that long double resolves the small differences that
 // matter.
 class OptimalityReference::Search {
  public:

@@ -12,7 +12,7 @@ namespace polygon {
 namespace {
 
 constexpr std::uint32_t kLeaf = 2;         // most triangles in a leaf
-constexpr std::size_t kTreeLevels = 64;    // levels; halves of 2^32 triangles need 32
+constexpr std::size_t kTreeLevels = 64;    // 2^32 triangles, halved at each level, need 32
 constexpr double kNoSpeed = 1e-300;        // stands for 0 in a way's direction, whose inverse must be finite
 constexpr double kWidened = 1e-9;          // of a triangle's area: no gap opens between neighbours
 constexpr double kBoxSlack = 1.0 + 1e-12;  // for the roundings of the test against a box
@@ -27,7 +27,7 @@ float float_above(double x) {
 }
 
 struct Way {
-  glm::dvec3 from, along, inverse;  // the whole way, and one over it
+  glm::dvec3 from, along, inverse;  // `along`: the whole way; `inverse`: 1 / along
   double radius;
 };
 
@@ -38,7 +38,7 @@ Way make_way(const glm::dvec3& from, const glm::dvec3& to, double radius) {
   return way;
 }
 
-// The part of the way at which the ball's box enters the box; above `most`: never before that.
+// The part of the way at which the ball's box enters the box. Infinite if it does not enter before `most`.
 double enters(const Way& way, const std::array<float, 3>& low, const std::array<float, 3>& high,
               double most) {
   double in = 0.0, out = most;
@@ -52,8 +52,9 @@ double enters(const Way& way, const std::array<float, 3>& low, const std::array<
   return in <= out * kBoxSlack ? in : std::numeric_limits<double>::infinity();
 }
 
-// Where the centre's distance to a moving point falls to the radius: the lesser root of a t² + 2 b t + c = 0,
-// or 0 for a ball that is too near already. Without a root, or if the distance grows: more than any part.
+// The part t of the way at which the centre's distance to a moving point falls to the radius. It is the
+// lesser root of a t² + 2 b t + c = 0, or 0 for a ball that is too near already. Infinite if there is no
+// root, or if the distance grows.
 double meets(double a, double b, double c) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   if (b >= 0.0 || a <= 0.0) return kNever;
@@ -79,7 +80,7 @@ bool is_over(const Corners& corner, const glm::dvec3& normal, const glm::dvec3& 
   return true;
 }
 
-// A ball against the inside of a face. True: it meets the face, so that it meets no rim before.
+// A ball against the inside of a face. True: the ball meets the face, and meets no rim before it.
 bool meet_face(const Way& way, const Corners& corner, const glm::dvec3& normal, SweptHit& best) {
   const double height = glm::dot(normal, way.from - corner[0]), speed = glm::dot(normal, way.along);
   const double side = height < 0.0 ? -1.0 : 1.0;
@@ -90,8 +91,8 @@ bool meet_face(const Way& way, const Corners& corner, const glm::dvec3& normal, 
   return true;
 }
 
-// The first hit of a moving ball on the side ab and on its corner a. The ball's centre then lies on a cylinder
-// round the side, or on a sphere round the corner.
+// The first hit of a moving ball on the side ab and on its corner a. The ball's centre then lies on a
+// cylinder round the side, or on a sphere round the corner.
 void meet_rim(const Way& way, const glm::dvec3& a, const glm::dvec3& b, SweptHit& best) {
   const glm::dvec3 side = b - a, at = way.from - a;
   const double ss = glm::dot(side, side), sw = glm::dot(side, way.along), sa = glm::dot(side, at);
@@ -197,7 +198,7 @@ SweptHit TriangleTree::first_hit(const glm::dvec3& from, const glm::dvec3& to, d
   double in = enters(way, nodes_[0].low, nodes_[0].high, best.part);
   while (true) {
     const Node& node = nodes_[at];
-    if (in <= best.part && node.count == 0) {  // the child that is entered first, first
+    if (in <= best.part && node.count == 0) {  // goes on with the child that the ball enters first
       const Node &a = nodes_[node.first], &b = nodes_[node.first + 1];
       const double in_a = enters(way, a.low, a.high, best.part), in_b = enters(way, b.low, b.high, best.part);
       const bool a_first = in_a <= in_b;

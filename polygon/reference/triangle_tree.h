@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The triangles of a mesh in a tree of axis-parallel boxes, for one question: where a ball that moves in a
-// straight line first meets a triangle. This is the collision detection of the peer in finger_proxy.h. It
+// The triangles of a mesh in a tree of axis-parallel boxes, for one query: the first triangle that a ball
+// meets when it moves in a straight line. This is the collision detection of the peer in finger_proxy.h. It
 // shares no code with the proxy's own queries.
 #pragma once
 

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kMostSidesAtPoint = 256;
 constexpr double kTurnRounding = 1e-9;  // rad; two edges with a smaller angle have one direction
 
-// A border edge. It runs opposite to the direction in which its triangle runs through it.
+// A border edge, in the direction opposite to that of its triangle's side.
 struct BorderSide {
   std::array<std::uint32_t, 2> ends{};  // points
   std::uint32_t triangle = 0;

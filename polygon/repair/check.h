@@ -22,7 +22,8 @@ struct MeshCheck {
   std::size_t border_edges = 0, nonmanifold_edges = 0, turned_edges = 0;
 };
 
-// How the mesh is touched, for a message: "a closed solid", or "a two-sided sheet" and the reason.
+// The way in which the mesh is touched, for a message: "a closed solid", or "a two-sided sheet" and the
+// reason.
 [[nodiscard]] std::string touched_as(const MeshCheck& check);
 
 // `deep` also searches for self-intersections (seconds for a million triangles).
@@ -46,8 +47,8 @@ struct RepairedMesh {
 };
 
 // Merges vertices, drops repeated and degenerate triangles, closes cracks, fills small holes, orients,
-// stitches, and turns closed pieces outward. Triangles with an area are kept. Defects that it cannot mend
-// (large holes, self-intersections) are left and reported. The work is bounded for every arrangement of
+// stitches, and turns closed pieces outward. Triangles with an area are kept. Defects that a repair cannot
+// mend (large holes, self-intersections) are left and reported. The work is bounded for every arrangement of
 // triangles, and the bound grows with their number. A mesh is repaired only if the user asks for it.
 RepairedMesh repair_mesh(const TriangleMesh& mesh, const RepairOptions& options = {});
 

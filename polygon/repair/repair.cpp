@@ -308,8 +308,8 @@ void say_how_it_ended(const TriangleMesh& mesh, Changes& changes) {
     changes.push_back({"R09-closed", Severity::info, 1, "the repaired mesh is closed"});
     return;
   }
-  // Findings give triangle numbers of the mesh as given. The repaired mesh has other numbers, so they are
-  // left out.
+  // Findings give triangle numbers of the mesh as given. The repaired mesh has other numbers, which are left
+  // out.
   const auto place_of = [&](std::string_view id) {
     std::optional<FindingPlace> place;
     for (const Finding& f : check.findings) {

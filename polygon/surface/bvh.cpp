@@ -70,8 +70,8 @@ Bvh::Bvh(std::size_t count, const BoxOf& box_of) {
   // Queries in a large tree wait for memory. There Embree's fast build is as quick to query, and takes less
   // memory and time to build. In a small tree its looser boxes would slow the queries.
   rtcSetSceneBuildQuality(scene_, count > kLargeTree ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
-  // User geometry instead of Embree's triangles: the boxes are rounded outwards here, which Embree's float
-  // vertices are not, and the vertices are not stored twice.
+  // User geometry is used instead of Embree's triangles. Its boxes are rounded outwards, but Embree's float
+  // vertices would not be. Embree would also store the vertices a second time.
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count));
   Build build{box_of};

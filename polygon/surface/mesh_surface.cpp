@@ -23,8 +23,9 @@
 namespace polygon {
 namespace {
 
-constexpr double kFarAway = 700.0;  // radii of the mesh: there the rounding of floats and the lens together
-                                    // cost least
+// Distance of the query that replaces one from further away (lens_radius()), in radii of the mesh. At this
+// distance the rounding of floats and the lens together cost least.
+constexpr double kFarAway = 700.0;
 
 class MeshSurface final : public RigidSurface {
  public:
@@ -287,7 +288,7 @@ bool MeshSurface::on_nearest(void* user, std::uint32_t box, float& radius) {
   return true;
 }
 
-// Radius of the query that replaces one from far away. From afar the float distances of all triangles are
+// Radius of the query that replaces a query from far away. From afar the float distances of all triangles are
 // equal, and Embree would return every triangle. So a far point at distance S from the centre is replaced by
 // a place on the line to it, at distance s. The mesh lies in a ball B of radius L. The points of B that are
 // as near to the far point as x form a lens, the intersection of two balls. That lens lies within √(|x −
@@ -356,8 +357,8 @@ bool MeshSurface::inside(const glm::dvec3& point) const noexcept {
 
 // Angle-weighted pseudonormals (Baerentzen & Aanaes, Signed distance computation using the angle weighted
 // pseudonormal, 2005). At an edge or a corner the sign of the distance must not depend on which triangle was
-// found first. They are computed on demand; stored for every vertex and edge they would take as much memory
-// as the mesh.
+// found first. The pseudonormals are computed on demand. Stored ones, for every vertex and edge, would take
+// as much memory as the mesh.
 bool MeshSurface::on_pseudonormal(void* user, std::uint32_t box, float& /*radius*/) {
   auto& q = *static_cast<PseudonormalQuery*>(user);
   const TriangleIndices& t = q.surface->triangles_[q.surface->element_of(box)];

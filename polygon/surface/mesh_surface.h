@@ -15,8 +15,8 @@ struct SurfaceOptions {
   bool vertex_normals = false;  // stores vertex normals (12 bytes each) for shaded_normal()
 };
 
-// Shares the mesh and makes no copy of it. The surface takes about 42 bytes per triangle beyond it, 12 of
-// them for the neighbours across edges.
+// Shares the mesh and makes no copy of it. Beyond the mesh, the surface takes about 42 bytes per triangle, 12
+// of them for the neighbours across edges.
 //
 // Triangles with the same three corners are one element, the first of them, so that a million copies do not
 // slow a query. When gather() returns complete == false it has written the nearest out.size() elements

@@ -120,7 +120,7 @@ class PrimitiveSurface final : public RigidSurface {
     return {kNoElement, kNoElement, kNoElement};
   }
 
-  // Never below a plane, because there is no second element that could cover it.
+  // Infinite, so that the element never counts as below a plane: no second element could take its place.
   [[nodiscard]] double support(std::uint32_t /*element*/,
                                const glm::dvec3& /*normal*/) const noexcept override {
     return std::numeric_limits<double>::infinity();

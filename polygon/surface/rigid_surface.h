@@ -78,7 +78,8 @@ class RigidSurface {
   // Unit normal of a flat element; zero if it has none.
   [[nodiscard]] virtual glm::dvec3 face_normal(std::uint32_t element) const noexcept = 0;
 
-  // max over the element of normal · x. An element is below a plane if this is at most the plane's offset.
+  // max over the element of normal · x. An element is below a plane if the maximum is at most the plane's
+  // offset.
   [[nodiscard]] virtual double support(std::uint32_t element, const glm::dvec3& normal) const noexcept = 0;
 
   // The elements across a flat element's edges; kNoElement if there is none or more than one.

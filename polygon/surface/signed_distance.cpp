@@ -9,8 +9,8 @@
 namespace polygon {
 namespace {
 
-// Relative to the largest coordinate: closer to the surface than this, the direction of the difference is
-// rounding error.
+// Distance from the surface, relative to the largest coordinate. Below it the direction from the surface to
+// the point is rounding error.
 constexpr double kOnSurface = 1e-13;
 
 }  // namespace

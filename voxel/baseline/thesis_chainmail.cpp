@@ -309,7 +309,8 @@ glm::dvec3 ThesisChainMail::force_N(ElementId v) const {
 }
 
 std::array<float, 3> ThesisChainMail::relaxed(ElementId v) const {
-  // A link at rest has equal displacements at both ends; so it requires the other end's displacement.
+  // A link is at rest if both ends have equal displacements. So it requires the displacement of its other
+  // end.
   const std::array<float, 3>& u = elements_[v].u;
   std::array<double, 3> asked{}, weight{};
   for (std::uint32_t d = 0; d < kDirections; ++d) {

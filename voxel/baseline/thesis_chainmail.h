@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`; sessions do not use it.
+// The soft object of the thesis, kept as a baseline for tests, `compare` and `bench`. Sessions do not use it.
 //
 // It has four parts. ChainMail uses a first-come queue of candidates with their sponsors (Figs 6 to 9).
 // Contact tests a point and six directions on a dense occupancy map (Fig 16). The force comes from the three
@@ -24,7 +24,7 @@
 namespace voxel {
 
 struct ThesisChainMailOptions {
-  // How far a relaxed element moves. `mean`: to the mean of the places that its links require, weighted by
+  // Movement of a relaxed element. `mean`: to the mean of the places that its links require, weighted by
   // stiffness. `sum`: by the sum of the moves that its links require, as in the thesis's first version (Fig
   // 22).
   enum class Movement : std::uint8_t { mean, sum } movement = Movement::mean;
@@ -35,7 +35,7 @@ struct ThesisChainMailOptions {
 
 class ThesisChainMail {
  public:
-  using ElementId = std::uint32_t;  // index into a grid with a border of one
+  using ElementId = std::uint32_t;  // index into a grid with a border of one element
 
   // Throws std::invalid_argument if the number of labels does not fit the volume's size, or if the volume
   // with its border has 2^29 cells or more. Materials are not checked (Lattice checks them).
@@ -63,8 +63,8 @@ class ThesisChainMail {
   static constexpr std::uint64_t kMaxRounds = 20;  // candidates per cell and direction
 
   // One round of the haptic thread (Fig 16); lengths in m in the volume frame. Looks up the tool's centre,
-  // then six points at `radius` from it. The first point that finds an element moves it, or a nearer element
-  // linked to it, to that point. The other points are ignored.
+  // then six points at `radius` from it. The first point that finds an element moves to the point this
+  // element, or a linked element that is nearer. The other points are ignored.
   struct Touch {
     bool contact = false;
     ElementId element = 0;

@@ -47,7 +47,7 @@ void ChainMail::spread_moves(Displacement& state, std::span<const VoxelId> voxel
         raised_[raised++] = {u[v], v};
       else
         lowered_[lowered++] = {u[v], v};
-      u[v] -= move;  // back to where no link is violated; the wave moves it again
+      u[v] -= move;  // back to a place without violation; the wave moves it again
     }
     // Axes share the budget. An axis passes the updates that it does not use to the next axis.
     const std::uint64_t share = std::max(kNearest, budget_left_ / static_cast<std::uint64_t>(3 - axis));

@@ -32,15 +32,15 @@ class ChainMail {
 
   static constexpr std::uint64_t kUnlimited = ChainWave::kUnlimited;
   // Row updates that a wave may take in any case, so that the surroundings of a contact are always settled. A
-  // row is 32 voxels along x; rows are taken in the order of their distance.
+  // row is 32 voxels along x. Rows are taken in the order of their distance.
   static constexpr std::uint64_t kNearest = 64;
 
   // Restores the limits of all links after the voxels `sources` were moved in `state` by `moves` (m). Before
   // these moves no link was violated. Sources yield to anchors and obstacles (indexed by surface number;
   // empty: none), and to one another if their places are infeasible together. Afterwards no link is violated
-  // by more than rounding, whatever the moves. Each source is given once; their order does not change a bit
-  // of the result. Rounding does not accumulate over calls: a link is violated by a few roundings of its ends
-  // at most. Allocates nothing.
+  // by more than rounding, whatever the moves. Each source is given once. The order of the sources does not
+  // change a bit of the result. Rounding does not accumulate over calls: a link is violated by a few
+  // roundings of its ends at most. Allocates nothing.
   //
   // Row updates beyond `budget` (one is about 0.1 us) wait, and later calls of settle() or finish() make
   // them. Until then a link is violated only if one of its ends is in a row of waiting_rows(). Between calls
@@ -77,7 +77,7 @@ class ChainMail {
   const Lattice& lattice_;
   ChainWave wave_;
   std::uint64_t budget_left_ = 0;
-  // [axis] Margin of this settle(), and of earlier ones with rows that still wait (m).
+  // [axis] Margin of this settle(), and of earlier calls of it whose rows still wait (m).
   std::array<float, 3> margin_{};
   LazyArray<ChainWave::Source> raised_, lowered_;
   bool stopped_by_moving_ = false;  // a moving obstacle has stopped some voxel in this call
@@ -85,7 +85,7 @@ class ChainMail {
   LazyVector<glm::vec3> stops_;
 };
 
-// The most by which any link of the lattice exceeds its limits (m); for tests.
+// Largest excess of a link of the lattice over its limits (m); for tests.
 double worst_violation(const Lattice& lattice, const Displacement& state);
 
 }  // namespace voxel

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The functions of lanes8.h for AVX-512: registers of 16 floats, and comparisons that give a mask. This
-// halves the operations on a row, and the test whether any lane moves is a single one. Results are the same
-// to the last bit. The functions are written in intrinsics, because the compiler's generic vectors of 16 are
+// halves the operations on a row. A single test shows whether any lane moves. Results are the same to the
+// last bit. The functions are written in intrinsics, because the compiler's generic vectors of 16 are
 // slower than those of 8.
 #pragma once
 

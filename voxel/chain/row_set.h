@@ -33,7 +33,7 @@ class RowSet {
     word |= bit;
     append(row, 1);
   }
-  // Adds the rows from … from + rows − 1; rows >= 1.
+  // Adds `rows` >= 1 consecutive rows. The first of them is `from`.
   void add(RowId from, RowId rows) noexcept {
     const RowId last = from + rows - 1;
     const auto bits_of = [&](RowId word) {

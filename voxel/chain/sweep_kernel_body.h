@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Innermost loop of a sweep, in functions of lanes8.h or lanes16.h. For each width, sweep_kernel.cpp includes
-// it in a namespace that uses one of the two. Hence it has neither guard nor namespace.
+// this file in a namespace that uses one of the two. Hence the file has neither guard nor namespace.
 // NOLINTBEGIN(llvm-header-guard)
 
 using RowValues = std::array<Floats, kVectors>;
@@ -314,10 +314,10 @@ struct UniformRows {
 };
 
 // Relaxes a row of one label beside rows of the same label or of labels with tighter limits. Links within the
-// row need no check: they allow whatever the rows before it require. The links back to the row before in y
-// need no check either: that row already has its value by a path of equal length, through the row before both
-// in z. The links back in z must be checked, because the same argument for z relies on y. If the row before
-// in x requires more, the function does nothing and returns false.
+// row need no check: they allow all moves that the rows before it require. The links back to the row before
+// in y need no check either: that row already has its value by a path of equal length, through the row before
+// both in z. The links back in z must be checked, because the same argument for z relies on y. If the row
+// before in x requires more, the function does nothing and returns false.
 template <bool kRaise>
 HYBRID_INLINE bool sweep_uniform(const SweepTask& p, UniformRows& rows, std::ptrdiff_t k, RowValues& y,
                                  Moved& what) {
@@ -392,7 +392,7 @@ HYBRID_INLINE SweepResult sweep_rows(const SweepTask& p, int most_visits, Moved*
     if (p.y && !moved_before) load_row(row.u - values, y);
     const std::uint8_t label = row.label, z_label = has_z ? p.z.info[k * step].label : label,
                        y_label = p.y ? (info - step)->label : label;
-    // Does this label allow within a row whatever the other label allows?
+    // Does this label allow all differences within a row that the other label allows?
     const auto allows = [&p, label](std::uint8_t other) {
       return other == label || (p.up[other] <= p.up[label] && p.down[other] <= p.down[label]);
     };

@@ -4,7 +4,7 @@
 // Rows are relaxed outwards from the sources: plane by plane (z), within a plane column by column, within a
 // column row by row. Each row is relaxed from the rows before it. This is the order of paths without detours.
 // If a row requires a move of a row before it, a path has a detour, and the earlier row is visited again.
-// Within a plane, sweeps repeat until no row is pending; between planes, the sweep in the opposite direction
+// Within a plane, sweeps repeat until no row is pending. Between planes, the sweep in the opposite direction
 // visits the row. A visit reads and writes a row once. With a queue, the visits to its neighbours would read
 // the row, too, and a detour found late would invalidate everything computed since.
 #include <algorithm>
@@ -324,7 +324,7 @@ void ChainWave::stop_sweep(const WaveArgs& p, Sweep& sweep) noexcept {
 }
 
 // Moves the voxels that must follow the sources, which are at their new places already. False if no sweep is
-// possible: then the queue must do it.
+// possible. Then the queue must move them.
 bool ChainWave::sweep(const WaveArgs& p, std::span<const Source> sources, std::uint64_t most,
                       std::uint64_t& visits) noexcept {
   Sweep sweep;

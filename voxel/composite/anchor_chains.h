@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far the chains of links from the anchors let each surface voxel go.
+// Bounds of the displacement of each surface voxel, by the chains of links from the anchors.
 #pragma once
 
 #include <array>

@@ -59,7 +59,7 @@ HYBRID_INLINE void add_forces(const BrickView& v, const BrickBlocks& blocks, con
       const std::size_t row = static_cast<std::size_t>(k) * v.plane + static_cast<std::size_t>(j) * v.stride;
       const bool covered = k >= v.covered_first[2] && k <= v.covered_last[2] && j >= v.covered_first[1] &&
                            j <= v.covered_last[1];
-      // Forces on the corners above in x of the vector before: [axis][y + 2z].
+      // Forces of the vector before on the upper corners of its cells in x: [axis][y + 2z].
       Float8 before[3][4] = {};
       bool any_before = false;
       for (int o = 0; o < vectors; ++o) {
@@ -150,9 +150,10 @@ BrickBlocks brick_blocks(const BrickStiffness& brick) {
 
 namespace {
 
-// The strain of all components whose weight is not 0, as a part of `less` (bricks less links), with the share
-// by which it follows: the stiffnesses of brick and links are in the ratio r if all components take part in a
-// motion, and nearer to 1 if only one does. The share is best for the mean of both cases.
+// Takes the mean strain of all components with a weight other than 0 out of `less` (bricks less links), and
+// finds the share by which this strain follows. The stiffnesses of brick and links have the ratio r if all
+// components take part in a motion, and a ratio nearer to 1 if only one does. The share is best for the mean
+// of both cases.
 MeanStrain take_strain(BrickBlocks& less, const BrickBlocks& links, std::size_t q,
                        const std::array<float, 3>& weight) {
   MeanStrain out{.weight = weight};
@@ -180,8 +181,8 @@ DeferredBrick deferred_brick(const BrickStiffness& brick, const BrickStiffness& 
   DeferredBrick out;
   out.rest = brick_blocks(difference(brick, links));
   const BrickBlocks of_links = brick_blocks(links);
-  // The stiffness of a link along d is E · volume / h_d². So the root of its ratio weighs the axes by 1 /
-  // h_d.
+  // The stiffness of a link along d is E · volume / h_d². So the root of the ratio of two such stiffnesses
+  // weighs the axes by 1 / h_d.
   std::array<float, 3> w{};
   for (std::size_t d = 0; d < 3; ++d) w[d] = std::sqrt(of_links.block[0][d][d] / of_links.block[0][0][0]);
   // In a plane of two axes, each component varies along the other axis.

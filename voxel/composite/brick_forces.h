@@ -49,8 +49,8 @@ struct BrickView {
   float scale;                    // of stiffness: edge of a cell, relative to the brick's
   std::array<float*, 3> force;    // [axis] receives the forces (N) in addition to its values
   std::array<int, 3> cells;       // along each axis
-  // Cells without forces, from the first to the last along each axis, as a finer patch covers them. None if
-  // the last is before the first.
+  // Cells without forces, because a finer patch covers them: from the first to the last along each axis. None
+  // if the last is before the first.
   std::array<int, 3> covered_first, covered_last;
   std::size_t stride, plane;  // to the next node along y, along z
 };

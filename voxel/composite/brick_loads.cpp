@@ -4,10 +4,10 @@
 // links of their cells. Cycles solve for the links, with the loads fixed. Loads are found anew before each
 // cycle.
 //
-// A link is shared by the cells beside it. A cell of a coarse level is a brick of the least stiffness that
-// any of its links has for it. What the other links have beyond that stays in the links alone, as where a
-// stiff layer crosses the cell. So links and loads together are never less stiff than bricks of the softest
-// tissue, and cycles converge.
+// The cells beside a link share its stiffness. A cell of a coarse level is a brick as stiff as the least
+// share that it has of one of its links. The other links may be stiffer, for example where a stiff layer
+// crosses the cell. Their excess stiffness stays in the links alone. So links and loads together are never
+// less stiff than bricks of the softest tissue, and cycles converge.
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -31,15 +31,15 @@ void for_cells(const GridLevel& level, const Visit& visit) {
   }
 }
 
-// Can a node without a link along d bear loads along d? An anchor does, and a node that is no unknown moves
-// with others.
+// Can a node without a link along d bear loads along d? An anchored node can. So can a node that is no
+// unknown, because it moves with others.
 bool holds_load(const GridLevel& level, std::size_t d, std::size_t n) noexcept {
   return level.anchor_weight[d][n] > 0.0F || level.inverse_diagonal[d][n] == 0.0F;
 }
 
-// The least stiffness that one of a cell's twelve links has for the cell, relative to that of a full link of
-// the level. Links that anchors replace do not count, if both ends can bear loads without them. `shared`: the
-// cells beside a link share it, those beyond an open side of the patch included.
+// The least share that a cell has of the stiffness of one of its twelve links, relative to a full link of the
+// level. Links that anchors replace do not count, if both ends can bear loads without them. `shared`: all
+// cells beside a link share it, including cells beyond an open side of the patch.
 float least_share(const GridLevel& level, const Index3& cell, bool shared) noexcept {
   const float whole = 1.0F / static_cast<float>(level.step);
   float least = std::numeric_limits<float>::max();
@@ -81,10 +81,10 @@ float least_share(const GridLevel& level, const Index3& cell, bool shared) noexc
   return least == std::numeric_limits<float>::max() ? 0.0F : least;
 }
 
-// Nodes on the open sides of a patch are interpolated from the coarse level, and their loads act on its
-// nodes. A node takes its share by its weight and by its stiffness: a node that barely touches the tissue
-// would move without bound under the load of stiff bricks. Nodes without stiffness, ghosts and anchors, count
-// as the stiffest of the others.
+// Nodes on the open sides of a patch are interpolated from the coarse level, and their loads act on coarse
+// nodes. The share of a coarse node is in proportion to its interpolation weight and to its stiffness. By the
+// weight alone, a node that barely touches the tissue would move without bound under the load of stiff
+// bricks. Nodes without stiffness (ghosts and anchors) count as the stiffest of the others.
 void add_loads_of_sides(const GridLevel& fine, GridLevel& coarse, std::size_t a) noexcept {
   const auto& nodes = fine.nodes;
   const auto on_side = [&](std::size_t d, int i) { return i < nodes[d].first || i > nodes[d].last; };
@@ -185,7 +185,7 @@ composite::BrickView CompositeGrid::brick_view(std::size_t l) const noexcept {
   return v;
 }
 
-// Finds the loads of all nodes, by strains that follow those of the present displacements.
+// Finds the loads of all nodes, from strains that follow those of the present displacements.
 void CompositeGrid::renew_brick_loads() noexcept {
   if (!has_bricks_) return;
   for (std::size_t l = 0; l <= covering_level_; ++l) {
@@ -212,9 +212,9 @@ void CompositeGrid::save_brick_strains(const Level& level, std::size_t floats) n
     std::copy_n(level.brick_strain[s].begin(), floats, before_move_.brick_strain[s].begin());
 }
 
-// Takes the strains that were saved before level l moved `by` nodes. Cells that the patch has reached take
-// the strain of the next coarser level: that of interpolated displacements would be far from equilibrium, as
-// they change their volume.
+// Takes the strains that were saved before level l moved `by` nodes. Cells that are new in the patch take the
+// strain of the next coarser level. The strain of interpolated displacements would be far from equilibrium,
+// because interpolation changes the volume of cells.
 void CompositeGrid::restore_brick_strains(std::size_t l, const Index3& by) noexcept {
   if (!has_bricks_) return;
   Level& level = levels_[l];

@@ -193,7 +193,7 @@ void CoarseMaterial::count_cells() {
   }
 }
 
-// Cells in a cube of 2^m cells an edge.
+// Number of cells in a cube of 2^m cells an edge.
 float CoarseMaterial::cell_count(const CubeLevel& level, int m, const Index3& cube) const noexcept {
   if (!level.in(cube)) return 0.0F;
   if (!fills_box_)

@@ -4,7 +4,7 @@
 //
 // A cell lies between eight voxels. It exists if all of them do, and is as stiff as the softest of them
 // (link_stiffness.h). Cell counts are stored for cubes of 4 cells an edge and larger, in a fortieth of a byte
-// per voxel; smaller cubes are counted from the labels. An object that fills its bounding box needs no
+// per voxel. Smaller cubes are counted from the labels. An object that fills its bounding box needs no
 // counts.
 //
 // Where tissues differ in stiffness, the stiffness of a cube along an axis is that of its columns in
@@ -41,8 +41,8 @@ class CoarseMaterial {
   using Index3 = std::array<int, 3>;
   [[nodiscard]] const Index3& offset() const { return offset_; }
   // For an object of one stiffness that fills its box. Chooses the offset such that the ends of the object
-  // nearest to a voxel are nodes of every level. An axis along which the voxel is about as far from both ends
-  // keeps its offset. Returns whether the offset changed.
+  // nearest to a voxel are nodes of every level. An axis along which the voxel is about equally far from both
+  // ends keeps its offset. Returns whether the offset changed.
   bool align_to(const Index3& voxel) noexcept;
   // Coordinates of the outermost voxels along d.
   [[nodiscard]] int low(std::size_t d) const { return offset_[d]; }
@@ -62,20 +62,20 @@ class CoarseMaterial {
 
   // Allocates scratch for planes of up to `cubes` cubes an axis, so that the functions below do not allocate.
   void reserve_planes(std::size_t cubes);
-  // Cells in each cube of plane z, from cube (first_x, first_y) on. out: [y][x], nx to a row.
+  // Number of cells in each cube of plane z, from cube (first_x, first_y) on. out: [y][x], nx to a row.
   void cell_counts(int m, int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
-  // Where tissues differ: cells of each cube times their stiffness along axis d, relative to the reference.
-  // out[d]: [y][x], nx to a row.
+  // Number of cells of each cube times their stiffness along axis d, relative to the reference. Only if
+  // is_heterogeneous(). out[d]: [y][x], nx to a row.
   void cube_stiffness(int m, int z, int first_x, int nx, int first_y, int ny,
                       const std::array<float*, 3>& out) noexcept;
   // Stiffness of single cells, relative to the reference; 0 where there is no cell. out: [y][x], nx to a row.
   void cell_stiffness(int z, int first_x, int nx, int first_y, int ny, float* out) noexcept;
   // Limits of links within a tissue, as shares of the spacing along the link: shorter, longer, sheared.
   using TissueLimits = std::array<float, 3>;
-  // Where limits differ: those of `nx` voxels along x from p on. Places without a voxel get those of the
-  // first surface voxel. out: [shorter, longer, sheared].
+  // Limits of `nx` voxels along x from p on, only if has_own_limits(). Places without a voxel get the limits
+  // of the first surface voxel. out: [shorter, longer, sheared].
   void voxel_limits(const Index3& p, int nx, const std::array<float*, 3>& out) noexcept;
-  // Where limits differ: cells of each cube times their limits. out: as in cube_stiffness().
+  // Number of cells of each cube times their limits, only if has_own_limits(). out: as in cube_stiffness().
   void cube_limits(int m, int z, int first_x, int nx, int first_y, int ny,
                    const std::array<float*, 3>& out) noexcept;
 
@@ -119,8 +119,8 @@ class CoarseMaterial {
     std::array<int, 2> cell{};  // −1 or 1: side of the cell along d + 1 and d + 2
     float stiffness = 1.0F;     // of the cell, relative to the reference
   };
-  // If anchors are scattered: calls visit(face) for the faces of the anchored voxels in the box, cube by
-  // cube.
+  // Calls visit(face) for the faces of the anchored voxels in the box, cube by cube. Only if
+  // has_scattered_anchors().
   template <class Visit>
   void for_anchor_faces(const Index3& low, const Index3& high, const Visit& visit) const;
   // Are the `count` voxels from p on in direction d all filled?

@@ -164,7 +164,8 @@ void CoarseMaterial::cube_stiffness(int m, int z, int first_x, int nx, int first
   add_thin_to_cubes(z, first_x, nx, first_y, ny, out);
 }
 
-// Weighs cubes of eight cells again that have thin links. cell_scratch_ still has the ranks of their cells.
+// Weighs again the cubes of eight cells that have thin links. cell_scratch_ still has the ranks of their
+// cells.
 void CoarseMaterial::add_thin_to_cubes(int z, int first_x, int nx, int first_y, int ny,
                                        const std::array<float*, 3>& out) noexcept {
   if (thin_links_.items.empty()) return;

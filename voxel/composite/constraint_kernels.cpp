@@ -91,8 +91,8 @@ HYBRID_INLINE void sweep_row_down(float* bound, const float* weight, const Limit
   }
 }
 
-// Raises the bounds of one of two rows beside each other by those of the other. `n`: first node of the lower
-// row; the other row is `by` floats further on along d. `up`: raises those of the upper row.
+// Raises the bounds of one of two neighbouring rows by the bounds of the other row. `n`: first node of the
+// lower row. The upper row is `by` floats further on along d. `up`: raises the bounds of the upper row.
 HYBRID_INLINE void raise_row(const BoundSweep& s, std::size_t d, std::size_t n, std::size_t by, bool up) {
   const float* const weight = s.weight[d] + n;
   const LimitOfLinks limit = from_node(up ? s.fall_up[d] : s.fall_down[d], n);
@@ -145,8 +145,8 @@ HYBRID_MULTIVERSIONED void sweep_bounds(const BoundSweep& s) noexcept {
 
 // Before a cycle, nodes at a bound move with the bound, and nodes beyond their bound move onto it. Smoothing
 // alone would move them by only one node a sweep. The reason: bounds fall off linearly with the distance from
-// a pressed node, so the nodes at them form a cone with plane sides. On a plane side the links of a node
-// balance; they pull only where two sides meet.
+// a pressed node, so the nodes at a bound form a cone with plane sides. On a plane side the links of a node
+// balance. They pull only where two sides meet.
 HYBRID_MULTIVERSIONED void follow_bounds(float* u, const float* at_bound, const float* lower,
                                          const float* negated_upper, float recedes_m,
                                          std::size_t count) noexcept {

@@ -53,9 +53,9 @@ CompositeGrid::NodeWeights CompositeGrid::weights_of_node(const Level& fine,
   return weights;
 }
 
-// Stiffness along d with which the fine level resists a correction of one coarse node, once it is prolonged.
-// A link counts by the squared difference of the interpolation weights at its ends, an anchor by the
-// interpolation weight of its node. middle: the fine node at the coarse node's place.
+// Stiffness along d with which the fine level resists the prolonged correction of one coarse node. A link
+// counts by the squared difference of the interpolation weights at its ends, an anchor by the interpolation
+// weight of its node. middle: the fine node at the coarse node's place.
 float CompositeGrid::prolonged_weight(const Level& fine, std::size_t middle, std::size_t d,
                                       const NodeWeights& of_node) noexcept {
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
@@ -82,8 +82,8 @@ float CompositeGrid::prolonged_weight(const Level& fine, std::size_t middle, std
 
 // A coarse level is a discretisation of its own. Its links may be weaker than the fine level's stiffness
 // against a prolonged correction: at a node that barely touches the tissue, at links across a gap, at
-// anchors, beside thin stiff tissue. A correction would then go too far. There a spring holds the node at its
-// present displacement; its stiffness is the difference. The spring does not change the solution.
+// anchors, beside thin stiff tissue. A correction would then go too far. There a spring of the missing
+// stiffness holds the node at its present displacement. The spring does not change the solution.
 void CompositeGrid::find_correction_springs(const Level& fine, Level& coarse) const noexcept {
   coarse.correction_springs.clear();
   if (material_.fills_box() && !material_.is_heterogeneous() && !material_.has_scattered_anchors()) return;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One FAC cycle over the levels of a CompositeGrid, axis by axis, in the full approximation scheme (FAS):
 // restriction down to the coarsest level, then correction and smoothing level by level up to the finest.
-// Where a finer patch covers a level, the level takes the finer displacements by injection. Its load f there
-// makes its residual equal to the restricted residual of the finer level. Elsewhere its nodes are unknowns;
-// f holds the loads of rigid surfaces and of the accurate energy.
+// Where a finer patch covers a level, the level takes the finer displacements by injection. There its load f
+// makes its residual equal to the restricted residual of the finer level. Elsewhere its nodes are unknowns,
+// and f holds the loads of rigid surfaces and of the accurate energy.
 #include <algorithm>
 
 #include "voxel/composite/grid.h"

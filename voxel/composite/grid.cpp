@@ -168,7 +168,7 @@ glm::dvec3 CompositeGrid::clamp_to_anchors(const Index3& voxel, const glm::dvec3
       if (material_.anchored_share(d, end) < 1.0) continue;
       const int links = end == 1 ? dims[d] - 1 - voxel[d] : voxel[d];
       for (std::size_t a = 0; a < 3; ++a) {
-        // Above the low face u is the extension of the chain of links; below the high face −u is.
+        // The extension of the chain of links is u above the low face, and −u below the high face.
         const double shorter = links * static_cast<double>(limit_m_[d][a][0].widest),
                      longer = links * static_cast<double>(limit_m_[d][a][1].widest);
         double& at = result[static_cast<int>(a)];

@@ -63,8 +63,8 @@ class CompositeGrid {
   };
   // Allocates.
   static Suitability suitability(const Lattice& lattice);
-  // kRefineAll: see the constructor. Half widths of patches: the least and the greatest one of level 0
-  // (voxels); that of all patches of a reference.
+  // kRefineAll: see the constructor. Half widths of patches (voxels): the least and the greatest of level 0,
+  // and that of all patches of a reference.
   static constexpr int kRefineAll = -1, kHalfWidth = 6, kMaxHalfWidth = 14, kReferenceHalfWidth = 24;
   // `half_width`: half width of level 0's patch (voxels). `coarse_half_width`: that of the other patches
   // (nodes). Both are rounded up to even numbers >= kHalfWidth. kRefineAll: level 0 covers the whole object,
@@ -74,7 +74,7 @@ class CompositeGrid {
   // from each surface voxel to the anchors, for clamp_to_supports(). Allocates.
   void find_chains_to_anchors();
   // Call it after a copy. A copied list has only as much capacity as it has elements, and some lists are cut
-  // short at their capacity. So a copy without it would work on other patches. Allocates.
+  // short at their capacity. So without this call the copy would work on other patches. Allocates.
   void reserve_like(const CompositeGrid& original);
   // Takes the displacements of another grid of the same object, interpolated.
   void interpolate_from(const CompositeGrid& other) noexcept;
@@ -135,13 +135,13 @@ class CompositeGrid {
   // itself, but by at most `most_m` (m).
   void extrapolate(std::size_t axis, double share, double most_m) noexcept;
   // Call both before a cycle. clear_pressed() removes the constraints of the tool, which has moved by
-  // `moved_m` since the last cycle. press() adds that of a voxel of level 0: where a component of `normal`
+  // `moved_m` since the last cycle. press() adds that of one voxel of level 0. Where a component of `normal`
   // (unit vector, into the tissue) exceeds kAlong, the voxel may not move back beyond `u` (m).
   void clear_pressed(double moved_m = 0.0) noexcept;
   void press(const Index3& voxel, const glm::dvec3& u, const glm::dvec3& normal) noexcept;
   // One FAC cycle over all levels, on these axes.
   void cycle(const std::array<bool, 3>& axes = {true, true, true}) noexcept;
-  // Force on the anchors and force on the tool (N), by the balance of the object and of level 0.
+  // Force on the anchors and force on the tool (N), by balance (pressing_force.cpp).
   [[nodiscard]] glm::dvec3 force_on_anchors_N() const noexcept;
   [[nodiscard]] glm::dvec3 force_on_tool_N() const noexcept;
   // Largest excess of a link of level 0 over its limits (m).

@@ -43,8 +43,9 @@ struct AxisNodes {
 struct AnchorFaces {
   Floats count, in_link, distance, constriction, stiffness;
 };
-// Springs that hold a node at its present displacement, beside the springs of its links. Without them
-// corrections would move it too far. weight [d]: stiffness relative to a link between two voxels.
+// Springs that hold a node at its present displacement, beside the springs of its links. Without these
+// springs corrections would move the node too far. weight [d]: stiffness relative to a link between two
+// voxels.
 struct CorrectionSpring {
   std::uint32_t node;
   std::array<float, 3> weight;

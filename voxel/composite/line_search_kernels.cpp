@@ -8,8 +8,8 @@
 namespace voxel::composite {
 namespace {
 
-// If half of a correction lies beyond the energy minimum, the energy does not change. If more lies beyond,
-// the correction is shortened, by at most kMaxShortening of its length.
+// If half of a correction lies beyond the energy minimum, the energy does not change. If more than half lies
+// beyond it, the correction is shortened, by at most kMaxShortening of its length.
 constexpr double kMinOvershoot = 0.5, kMaxShortening = 0.9;
 
 }  // namespace

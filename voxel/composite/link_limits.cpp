@@ -88,8 +88,8 @@ void CompositeGrid::update_multipliers(std::size_t a) noexcept {
 }
 
 // Nodes in the sides of a patch within the object hold displacements interpolated from the next level. These
-// may exceed the limits of single links. So links of such nodes have no multipliers; the next level's links
-// have.
+// may exceed the limits of single links. So links of such nodes have no multipliers. The links of the next
+// level have them.
 void CompositeGrid::drop_multipliers_at_sides(Level& level, std::size_t a) noexcept {
   const auto& nodes = level.nodes;
   for (std::size_t e = 0; e < 3; ++e) {
@@ -141,8 +141,8 @@ void CompositeGrid::for_anchor_ratios(const Level& level, std::size_t a, std::si
   const float* const u = level.u[a].data();
   for (std::size_t n = from; n < end; ++n) {
     if (weight[n] == 0.0F) continue;
-    // The chain's extension is −u if the anchor is ahead, u if it is behind. Limits are those of a link as
-    // long as the level's step, the chain is `distance` voxels long.
+    // The chain's extension is −u if the anchor is ahead, u if it is behind. The limits are those of a link
+    // as long as the level's step, but the chain is `distance` voxels long.
     const float longer = -u[n] * static_cast<float>(level.step) / distance[n];
     visit(n, std::max(longer / composite::limit_at(longest, n - from, 0),
                       -longer / composite::limit_at(shortest, n - from, 0)));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The force of the tool on a CompositeGrid: the force that balances links and loads within one patch.
 //
-// In most contacts it is the patch of level 0. In deep presses, chains at their limits pass the tool's force
-// on to nodes further away; then it is the patch that covers the object, whose sides are anchors alone. That
-// patch would do for all contacts, but it is less exact: where links of a coarse level differ from those of
-// the finer one, as at gaps, force is lost or made at the side of a patch.
+// In most contacts this patch is that of level 0. In deep presses, chains at their limits pass the tool's
+// force on to nodes further away. Then it is the patch that covers the object, whose sides are anchors alone.
+// That patch would serve for all contacts, but is less exact. Where links of a coarse level differ from those
+// of the finer one, as at gaps, the sum of forces has an error at the side of the finer patch.
 #include <cmath>
 
 #include "voxel/composite/grid.h"
@@ -52,7 +52,7 @@ double CompositeGrid::force_of_tool_bounds(std::size_t l, std::size_t a) noexcep
 }
 
 // Force that balances the links and loads of a patch's unknowns (N). Forces of links and bricks between two
-// unknowns cancel, so finer patches need no regard. The bricks' forces on all nodes of the patch sum to zero,
+// unknowns cancel, so finer patches have no effect. The bricks' forces on all nodes of the patch sum to zero,
 // so the loads of the unknowns are minus those of the other nodes.
 double CompositeGrid::force_on_patch(std::size_t l, std::size_t a) noexcept {
   Level& level = levels_[l];
@@ -89,7 +89,7 @@ glm::dvec3 CompositeGrid::force_on_tool_N() const noexcept {
   return on_tool_N;
 }
 
-// The anchors bear what rigid surfaces do not.
+// The anchors bear the part of the tool's force that rigid surfaces do not bear.
 glm::dvec3 CompositeGrid::force_on_anchors_N() const noexcept {
   glm::dvec3 on_anchors_N = -force_on_tool_N();
   for (const ObstacleBound& b : obstacle_bounds_) on_anchors_N += force_of(b);

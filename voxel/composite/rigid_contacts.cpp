@@ -26,10 +26,10 @@ namespace {
 
 using composite::index;
 
-constexpr float kNearby = 3.0F;    // steps of the level: nodes further from their plane get no bound
-constexpr float kSupports = 0.5F;  // steps: nodes nearer to their plane count in clamp_to_supports()
-constexpr float kFollows = 0.5F;   // share of its distance to the bound's force that a load covers in a cycle
-constexpr float kHolds = 1e-3F;    // spacings: a node nearer to its bound is held by it
+constexpr float kNearby = 3.0F;        // steps of the level: nodes further from their plane get no bound
+constexpr float kSupports = 0.5F;      // steps: nodes nearer to their plane count in clamp_to_supports()
+constexpr float kFollows = 0.5F;       // share of the missing force that a load gains in a cycle
+constexpr float kHolds = 1e-3F;        // spacings: a node nearer to its bound is held by it
 constexpr std::size_t kOffered = 512;  // surface voxels that are offered to their nodes in a cycle
 
 }  // namespace
@@ -140,7 +140,7 @@ void CompositeGrid::bound_by_obstacle(std::size_t l, const ObstacleNode& node, f
   const auto level = static_cast<std::uint32_t>(l);
   const int along = largest_axis(glm::dvec3(o.normal));
   const float normal = o.normal[along];
-  // The stored force belongs to a node of another level, which stands for another number of voxels.
+  // A force of another level is dropped, because a node of that level stands for another number of voxels.
   ObstacleLoad& load = obstacle_loads_[node.surface];
   if (load.level != level) load = {0.0F, level};
   obstacle_bounds_.push_back({level, node, index(along), normal > 0.0F ? 1.0F : -1.0F,
@@ -265,9 +265,9 @@ bool CompositeGrid::holds(const ObstacleBound& b) const noexcept {
   return beyond_m <= kHolds * static_cast<float>(lattice_.min_spacing_m());
 }
 
-// By how much a bound falls (m) at most along the shortest chain of links from the box low … high to the
-// place `at` (coordinates). A node of a coarse level stands for all voxels up to `beyond` voxels (half a
-// step) away across the bound's axis, so that many links do not count.
+// The largest fall of a bound (m) along the shortest chain of links from the box low … high to the place `at`
+// (coordinates). A node of a coarse level stands for all voxels up to `beyond` voxels (half a step) away
+// across the bound's axis. So along the other axes the first `beyond` links do not count.
 double CompositeGrid::fall_from(const Index3& at, std::size_t axis, std::size_t kind, const Index3& low,
                                 const Index3& high, int beyond) const noexcept {
   double fall = 0.0;
@@ -290,7 +290,7 @@ glm::dvec3 CompositeGrid::clamp_to_obstacles(const Index3& voxel, const glm::dve
     for (const std::size_t kind : {std::size_t{0}, std::size_t{1}}) {
       const double sign = kind == 0 ? 1.0 : -1.0;
       const SupportBox& box = supports_[axis][kind];
-      // Quick test: no bound is nearer than the box or greater than its greatest bound.
+      // Quick test: no bound is nearer than the box, or greater than `most`.
       if (!box.any || sign * to >= static_cast<double>(box.most) -
                                        fall_from(at, axis, kind, box.low, box.high, box.beyond))
         continue;

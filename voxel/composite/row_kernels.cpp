@@ -15,7 +15,7 @@ const std::array<float, kMaxVectors* kLanes> kNoBoundRow = [] {
 }();
 
 // Share of the stiffness of links to active nodes that is passed to coarser levels. With a share of 1 a
-// moving contact lags; with a third the contact oscillates.
+// moving contact lags. With a share of a third the contact oscillates.
 constexpr float kActiveStiffness = 0.5F;
 
 // Masks of every second lane. even: from lane 0 on; odd: from lane 1 on.

@@ -10,7 +10,7 @@
 namespace voxel {
 namespace {
 
-// Least resistance of a face, relative to a link between voxels. Faces in their node's plane have it.
+// Least resistance of a face, relative to a link between voxels. A face in its node's plane has this value.
 constexpr float kLeastResistance = 0.01F;
 
 }  // namespace
@@ -88,7 +88,7 @@ void CompositeGrid::gather_anchors(Level& level) noexcept {
       if (weight > 0.0F) level.anchor_weight[d][n] = weight;
     }
   }
-  // A node behind a face has only anchored tissue if no other face holds the node. Such a node gets the
+  // If no other face holds a node behind a face, all tissue at the node is anchored. Such a node gets the
   // stiffest spring.
   const auto is_held = [&](std::size_t n) {
     return level.anchor_weight[0][n] + level.anchor_weight[1][n] + level.anchor_weight[2][n] > 0.0F;

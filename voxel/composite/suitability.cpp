@@ -17,7 +17,8 @@ using composite::index;
 constexpr int kTrialHalfWidth = 10;  // of level 0 in trials
 constexpr double kConverges = 0.85;  // largest accepted mean convergence factor of displacements per cycle
 // Largest accepted error, as a share of the force with patches twice as wide: two just noticeable
-// differences of 7 %. hybrid/feel/just_noticeable.h has the same figures; this library must not include it.
+// differences of 7 %. This library must not include hybrid/feel/just_noticeable.h, which has the same
+// figures.
 constexpr double kMaxForceError = 0.14;
 // Forces are scaled to a press as deep as this share of the object's smallest side. Errors are relative to
 // the force, or to 0.57 N if the force is smaller: 7 % of 0.57 N is 0.04 N, which a hand does not feel.
@@ -31,7 +32,7 @@ bool one_voxel_thick(const Lattice& lattice, VoxelId v) {
 }
 
 // Voxels for trials: at most kPlaces of the surface, and as many of the parts that are one voxel thick in
-// air, which coarse levels resolve least. Both are evenly numbered.
+// air, which coarse levels resolve least. Both samples are evenly spaced in the order of voxels.
 std::vector<VoxelId> trial_places(const Lattice& lattice) {
   constexpr std::size_t kPlaces = 12;
   const auto surface = lattice.surface();
@@ -81,8 +82,8 @@ CompositeGrid::Suitability CompositeGrid::suitability(const Lattice& lattice) {
   return CompositeGrid(lattice, kTrialHalfWidth).try_contacts();
 }
 
-// Trials at places all over the surface: cycles must converge to rest, and a pressed voxel must feel the
-// force that it feels with patches twice as wide.
+// Trials at places all over the surface. Cycles must converge to rest. The force on a pressed voxel must
+// equal that on patches twice as wide, within kMaxForceError.
 CompositeGrid::Suitability CompositeGrid::try_contacts() {
   CompositeGrid wide(lattice_, 2 * kTrialHalfWidth, 2 * kHalfWidth);
   // Differences between neighbours stay below every limit, so that limits play no part.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Sheets and rows of single voxels as the levels of a CompositeGrid see them (coarse_material.h). A cell is
-// as stiff as the softest of its voxels, so such tissue fills no cell of its own. Level 0 has its links as
-// the lattice has them. On coarse levels the excess of a link is shared among its cells, as stiffness along
-// the link.
+// as stiff as the softest of its voxels, so such tissue fills no cell of its own. On level 0 the links
+// of such tissue are those of the lattice. On coarse levels the excess of a link is shared among its cells,
+// as stiffness along the link.
 #include <algorithm>
 #include <bit>
 
@@ -32,7 +32,7 @@ void CoarseMaterial::list_thin_links() {
 
 void CoarseMaterial::add_thin_link(const Index3& voxel, std::size_t d) {
   const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
-  // Rank of the softer end of the parallel at offset (p, q); 0: there is none.
+  // Rank of the softer end of the parallel link at offset (p, q); 0: there is none.
   const auto rank_at = [&](int p, int q) {
     Index3 from = voxel;
     from[e] += p;

@@ -39,7 +39,7 @@ struct ProlongByLinksArgs {
   // Weights of the links along y before and after the fine row. [0]: in the plane of rows[0]; [1]: in the
   // plane after it in z.
   std::array<std::array<const float*, 2>, 2> link_y;
-  std::array<const float*, 2> link_z;  // weights of the links along z before and after it
+  std::array<const float*, 2> link_z;  // weights of the links along z before and after the fine row
   bool between_y, between_z;
 };
 void prolong_row_by_links(const ProlongArgs& args, const ProlongByLinksArgs& by) noexcept;

@@ -12,8 +12,8 @@ namespace {
 // from largest_ratio().
 constexpr double kLeastRatio = 0.5;
 // Step as a fraction of the stability limit, and upper bound of the momentum. More momentum converges sooner
-// for a held tool, but increases the error for a moving tool. The optimal momentum made tissue of ν 0.49
-// oscillate.
+// for a held tool, but increases the error for a moving tool. With the optimal momentum tissue of ν 0.49
+// oscillates.
 constexpr double kBelowLimit = 0.6, kMostCarriedOn = 0.3;
 // Progress of the rounds, by their largest error of a load (end_round()). An error below kGain times the
 // least one so far is a gain. An error above kElsewhere times the least one shows that the tissue has moved,
@@ -88,8 +88,8 @@ bool BrickLoads::begin_round() noexcept {
 }
 
 // Damps the iteration while it makes no progress. With many links at their limits it does not converge: other
-// links come to their limits in each round, and the loads change with them. A tool that was held still then
-// felt a force that wandered sideways. So step and momentum shrink after kPatience rounds without progress,
+// links come to their limits in each round, and the loads change with them. A tool that is held still would
+// feel a force that wanders sideways. So step and momentum shrink after kPatience rounds without progress,
 // until the error grows by the factor kElsewhere.
 void BrickLoads::end_round() noexcept {
   left_N_ = worst_N_;

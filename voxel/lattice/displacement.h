@@ -82,7 +82,7 @@ struct Displacement {
 
   std::array<LazyArray<float>, 3> u;                    // [axis][v] (unit: meter)
   LazyArray<std::uint8_t> role;                         // [v]
-  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row] number with stands(), at_obstacle()
+  LazyArray<std::uint8_t> row_standing, row_obstacles;  // [row] number of voxels with stands(), at_obstacle()
   LazyArray<glm::vec3> tool_normal;  // [surface number] unit, out of the tool; for pressed voxels
   PlasticOffsets plastic;
   BrickLoad bricks;

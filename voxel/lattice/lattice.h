@@ -88,8 +88,8 @@ struct VoxelSprings {
 
 class Lattice {
  public:
-  // Throws std::invalid_argument with a message for the user: no voxel, no anchor (a free object has no
-  // equilibrium force), a material out of range, more than 2^31 cells.
+  // Throws std::invalid_argument, with a message for the user, if there is no voxel or no anchor (a free
+  // object has no equilibrium force), a material is out of range, or there are more than 2^31 cells.
   Lattice(const LabelVolume& volume, const LatticeOptions& options);
   // Builds the same lattice, but returns the volume's memory to the system while reading it and leaves the
   // volume empty.

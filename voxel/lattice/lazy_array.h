@@ -30,7 +30,7 @@ class LazyArray {
     void* at = ::mmap(nullptr, count * sizeof(T), PROT_READ | PROT_WRITE,
                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (at == MAP_FAILED) throw std::bad_alloc();
-    // A huge page would take 2 MiB for one voxel. A kernel without huge pages refuses the call; this is no
+    // A huge page would take 2 MiB for one voxel. A kernel without huge pages refuses the call, which is no
     // error.
     (void)::madvise(at, count * sizeof(T), MADV_NOHUGEPAGE);
     data_ = static_cast<T*>(at);

@@ -165,8 +165,8 @@ class LevelStiffness {
   enum Content : std::uint8_t { nothing = 0, some = 1, held = 2 };
   static Content together(Content a, Content b) { return a == nothing || (a == held && b == some) ? b : a; }
   // Springs of the up-links of a mixed row, [d][lane]. The entry before lane 0 in x is the down-link of lane
-  // 0. The other down-links are stored with their own rows, and Cells apart, so that a cycle reads less
-  // memory.
+  // 0. The other down-links are stored with their own rows, and Cells in an array of their own, so that a
+  // cycle reads less memory.
   struct alignas(64) Written {
     // floats before the first value; the last of them is the link down along x
     static constexpr std::size_t kBefore = 8;

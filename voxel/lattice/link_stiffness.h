@@ -33,8 +33,8 @@ inline constexpr std::size_t kLinkItself = 4;
 //
 // The share is 1 inside, 1/2 on a face, 1/4 on an edge, 3/4 along a notch. On a flat surface the stiffness
 // for a wave is then second-order accurate in the spacing. With whole links at the border it would be
-// first-order accurate. A direction without a neighbour on either side does not reduce the share: a sheet one
-// voxel thick keeps the thickness of its voxels, a row of voxels its whole area.
+// first-order accurate. A direction without a neighbour on either side does not reduce the share. So a sheet
+// one voxel thick keeps the thickness of its voxels, and a row of voxels keeps its whole area.
 [[nodiscard]] constexpr double link_weight(std::uint32_t parallels) {
   const auto there = [parallels](int p, int q) { return (parallels >> (p + 1 + 3 * (q + 1)) & 1U) != 0; };
   int quarters = 0;
@@ -110,7 +110,7 @@ struct LinkParts {
 }
 
 // Moduli for the springs beside the bricks of the accurate energy (voxel/fem/hex_element.h). Bricks replace
-// the cells; tissue too thin for a brick keeps its links. Bricks and links act on the same voxels.
+// the cells. Tissue too thin for a brick keeps its links. Bricks and links act on the same voxels.
 [[nodiscard]] constexpr LinkModuli link_moduli_beside_bricks(const std::array<LinkModuli, 9>& links) {
   return link_parts(links).thin;
 }

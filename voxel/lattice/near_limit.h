@@ -12,7 +12,8 @@ namespace voxel {
 inline constexpr float kAtLimit = 1e-4F;
 
 // Quick test: false if no link of the voxel is within `share` of the spacing of a limit on this axis. Uses
-// the tightest limits of all links, which is much cheaper than each link's own, so true may be a false alarm.
+// the tightest limits of all links, because a look-up of each link's own limits costs much more. So `true`
+// may be a false alarm.
 inline bool may_be_at_limit(const Lattice& lattice, const Displacement& state, VoxelId v, int axis,
                             float share) noexcept {
   const auto& u = state.u[static_cast<std::size_t>(axis)];

@@ -2,9 +2,9 @@
 // Plastic offsets of yielded links, and their loads on voxels.
 //
 // A step leads from one state of rest to the next. Within a step the force of a link stays constant beyond
-// its yield; the difference to its spring's force is a load on its two ends. The state of rest minimises the
-// convex energy of voxel/lattice/plasticity.h and does not depend on the path. The offsets move once that
-// state is reached.
+// its yield. Its difference from the spring's force is a load on the two ends of the link. The state of rest
+// minimises the convex energy of voxel/lattice/plasticity.h and does not depend on the path. The offsets move
+// when that state is reached.
 #pragma once
 
 #include <array>

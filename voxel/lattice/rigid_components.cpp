@@ -13,7 +13,7 @@ bool Lattice::any_without_slack() const {
                      [](const LinkMaterial& m) { return m.without_slack(); });
 }
 
-// Flood fill: appends to `voxels` all voxels without slack that are connected to them, where `enter` returns
+// Flood fill from `voxels`: appends to the list all connected voxels without slack for which `enter` returns
 // true. `enter` must return true at most once per voxel.
 template <class Enter>
 void Lattice::flood(std::vector<VoxelId>& voxels, const Enter& enter) const {

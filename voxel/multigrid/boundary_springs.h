@@ -24,8 +24,8 @@ namespace voxel {
 
 class BoundarySprings {
  public:
-  // How a voxel is fixed: not at all, on all axes, or along a normal while it slides on the tool or on an
-  // obstacle.
+  // The way in which a voxel is fixed: not at all, on all axes, or along a normal while it slides on the tool
+  // or on an obstacle.
   struct Support {
     enum class By : std::uint8_t { nothing, obstacle, tool, all } by = By::nothing;
     // Normal (unit: 1/kUnit). It is rounded, so that it does not change if the surface hardly turns.
@@ -43,7 +43,7 @@ class BoundarySprings {
   // Sets the voxels that the tool and other objects hold on all axes; at most as many as there are surface
   // voxels.
   void set_held(std::span<const VoxelId> held) noexcept;
-  // Sets how voxel v is fixed by its obstacle, or by the tool that it slides on; takes effect with renew().
+  // Sets the support of voxel v by its obstacle, or by the tool that it slides on. Takes effect with renew().
   void support(VoxelId v, const Support& by) noexcept;
   [[nodiscard]] bool supports(RowId row) const { return row_supported_[row] != 0; }
   void renew() noexcept;
@@ -150,7 +150,7 @@ class BoundarySprings {
   LazyArray<std::uint8_t> held_mark_;         // [voxel]
   LazyArray<Support> supported_;              // [voxel]
   LazyArray<std::uint8_t> row_supported_;     // [row] 1: a voxel of it was ever supported
-  std::array<LazyVector<VoxelId>, 2> queue_;  // cells to be renewed: of one level, of the next
+  std::array<LazyVector<VoxelId>, 2> queue_;  // cells to be renewed, of one level and of the next
 };
 
 }  // namespace voxel

@@ -121,9 +121,9 @@ float Multigrid::smooth_voxels(const LevelRow& r, RowId row, Displacement& state
 }
 
 // Corrects a row of voxels as far as links and obstacles allow. An obstacle may refuse a part of the
-// correction. Unlike a part refused by links, it is not subtracted from the cells above: the voxel slides
-// along the obstacle with its neighbours, and cells that lose that part in every cycle oscillate between two
-// states.
+// correction. This part, unlike a part refused by links, is not subtracted from the cells above. The voxel
+// slides along the obstacle with its neighbours. Cells that lost the part in every cycle would oscillate
+// between two states.
 RowCorrection Multigrid::correct_voxels(const LevelRow& r, RowId row, const RowVector& correction,
                                         Displacement& state, const ObstacleView& obstacles, LaneSpan span,
                                         RowVector& refused) noexcept {
@@ -175,7 +175,7 @@ void Multigrid::balance_contacts(RowId row, Displacement& state, const ObstacleV
   }
 }
 
-// Adds motion of another solver. It takes no voxel deeper into its obstacle than it was, except by rounding.
+// Adds motion of another solver. The motion takes no voxel deeper into its obstacle, except by rounding.
 // Rounding must not count as an overlap: the voxel would be projected out again while its neighbours have not
 // moved yet, and the two solvers would differ more with each exchange.
 void Multigrid::add_motion(RowId row, const RowVector& way, Displacement& state,

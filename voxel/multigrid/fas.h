@@ -125,7 +125,7 @@ class Multigrid {
   // Restricts values: the value of a coarse cell becomes the mean of its children plus its pending
   // correction.
   void restrict_values(int level, RowId row, Displacement& state, LaneSpan span = {}) noexcept;
-  // Restricts loads. The load of a coarse cell makes its residual, at its prolonged value, the sum of its
+  // Restricts loads. With its load, the residual of a coarse cell at the prolonged value is the sum of its
   // children's residuals. Returns the largest residual on the finer level (N); for level 1 that is the level
   // of voxels. If the span is the whole row, it also finds which finer rows are at rest.
   float restrict_loads(int level, RowId row, Displacement& state, const ObstacleView& obstacles,
@@ -179,7 +179,7 @@ class Multigrid {
   [[nodiscard]] glm::dvec3 residual_of_block(std::size_t block) const noexcept {
     return block_state_[block].frozen_N;
   }
-  // How far its links let a block move, [axis][down, up] (m); down <= 0 <= up.
+  // Interval in which its links let a block move, [axis][down, up] (m); down <= 0 <= up.
   using AdmissibleInterval = std::array<std::array<double, 2>, 3>;
   [[nodiscard]] AdmissibleInterval interval_of_block(std::size_t block,
                                                      const Displacement& state) const noexcept;

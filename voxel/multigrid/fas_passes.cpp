@@ -183,8 +183,8 @@ RowResidual Multigrid::residual_of(int level, RowId row, Displacement& state, co
         stop_cells(static_cast<VoxelId>(row * kRow + i), static_cast<std::uint8_t>(1U << axis));
     }
   }
-  // Active limits balance the residual against them. If it were restricted, coarse levels would push against
-  // links that do not yield, and later sweeps would undo that.
+  // Active limits balance the residual against them. If this residual were restricted, coarse levels would
+  // push against links that do not yield, and later sweeps would undo the correction.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < kRow && found.resisted[axis] >> i != 0; ++i) {
       if ((found.resisted[axis] >> i & 1U) != 0)

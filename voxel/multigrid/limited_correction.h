@@ -34,7 +34,7 @@ class LimitedCorrection {
     bool out = false;     // it has moved
     bool cut = false;     // voxels that do not move were asked to move
     bool aims = false;    // its target is stored, because the row may miss it
-    RowVector from;       // before it moves: its motion (m); afterwards: where it was (m)
+    RowVector from;       // before it moves: its motion (m); afterwards: its old place (m)
   };
 
   LimitedCorrection() = default;

@@ -17,7 +17,8 @@ namespace {
 constexpr double kRounding = 1.2e-7;   // last bit of a float, relative
 constexpr double kNearObstacle = 2.0;  // (unit: spacing) obstacles further away are skipped
 constexpr std::uint32_t kAllLanes = ~std::uint32_t{0};
-// How far the voxel of a block at a link's end may move on an axis before the link stops it: {down, up} (m).
+// Distances {down, up} (m) that the block's voxel at a link's end may move on an axis before the link stops
+// it.
 std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state, const RigidBlocks::Link& l,
                               int axis) {
   const auto& u = state.u[static_cast<std::size_t>(axis)];
@@ -27,8 +28,8 @@ std::array<double, 2> room_at(const Lattice& lattice, const Displacement& state,
              apart = std::max(0.0, static_cast<double>(bounds[1] - difference));
   return l.up ? std::array<double, 2>{apart, closer} : std::array<double, 2>{closer, apart};
 }
-// How much further the block's voxel may move if voxel v at the link's other end comes along as far as v's
-// other links allow.
+// Additional distance (m) that the block's voxel may move if voxel v at the link's other end comes along as
+// far as v's other links allow.
 double room_beside(const Lattice& lattice, const Displacement& state, VoxelId v, std::uint16_t block,
                    int axis, bool upwards) {
   if (state.role[v] != Displacement::free || lattice.anchored(v)) return 0.0;

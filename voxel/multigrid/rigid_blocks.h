@@ -122,9 +122,10 @@ class RigidBlocks {
     LazyArray<std::uint16_t> number;  // [cell]; empty on level 0
     std::vector<std::uint8_t> row;    // [row] 1: has cells of blocks; kFilled, kFilledKnown; 0: has none
   };
-  // kFilled: the row has cells of blocks only. kFilledKnown: and the next coarser level knows all of them.
+  // kFilled: the row has cells of blocks only. kFilledKnown: the next coarser level also knows all these
+  // blocks.
   static constexpr std::uint8_t kFilled = 2, kFilledKnown = 3;
-  // A cell, and how many voxels of one block it holds.
+  // A cell, and the number of voxels of one block in it.
   struct Share {
     VoxelId cell;
     std::uint32_t voxels;

@@ -87,7 +87,7 @@ HYBRID_INLINE void narrow_beside(Interval& in, const Around& at, const AxisSprin
   narrow<kUniform, kLimits>(in, at.y_up, at.y_down, s, b, 1, group);
   narrow<kUniform, kLimits>(in, at.z_up, at.z_down, s, b, 2, group);
 }
-// Clamps `wanted` to an interval. An interval can only be empty by rounding; then the voxel stays where it
+// Clamps `wanted` to an interval. An interval can only be empty by rounding. Then the voxel stays where it
 // is.
 HYBRID_INLINE void bring_into(Float8& wanted, const Interval& in, const Float8& now) {
   take_largest(wanted, in.low);
@@ -189,9 +189,9 @@ HYBRID_INLINE void look_beyond_lanes(Mask8& beyond, const Float8& own, const Flo
   }
 }
 
-// How links are compared with limits. `tightest`: all with the tightest limits; missing neighbours count as
-// neighbours at rest, so that no spring is read. `linked`: those that exist, with the tightest limits.
-// `lanes`: each link with its own limits.
+// Comparison of links with limits. `tightest`: all links, with the tightest limits; missing neighbours count
+// as neighbours at rest, so that no spring is read. `linked`: existing links, with the tightest limits.
+// `lanes`: each link, with its own limits.
 enum class Beyond : std::uint8_t { tightest, linked, lanes };
 
 // Marks the lanes that have a link beyond these limits, by axis. True if there is any.

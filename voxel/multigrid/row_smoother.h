@@ -32,8 +32,8 @@ struct LevelRow {
   float hold_times = 1.0F;
 };
 
-// Moves every second voxel or cell (`limits` null) of a row, then the others, each to the minimum of its
-// energy. The rows around stay fixed. Returns the largest motion (m).
+// Moves every second voxel or cell of a row, then the others, each to the minimum of its energy. For cells
+// `limits` is null. The rows around stay fixed. Returns the largest motion (m).
 float smooth_row(const LevelRow& row, const RowLimits* limits, LaneSpan span) noexcept;
 
 using RowVector = std::array<Lanes, 3>;  // [axis][lane]

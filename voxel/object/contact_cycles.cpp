@@ -25,8 +25,8 @@ constexpr double kContraction = 0.5;
 // Contact cycles a tick, at most.
 constexpr int kMostCycles = 2;
 // Distance of the contact from equilibrium (unit: spacing). Beyond it, a second contact cycle runs in a tick.
-// A cycle that is split over ticks is an exception, because a second one gains little and exceeds the time of
-// a tick.
+// A cycle that is split over ticks is an exception: a second cycle would gain little and exceed the time of a
+// tick.
 constexpr double kJump = 0.1;
 // Counted work (Float8 prolonged) that a tick may spend on split cycles under asynchronous relaxation. A
 // cycle that is not finished continues in the next tick. If a cycle ends and at least kLeastWork is left of
@@ -208,7 +208,7 @@ std::size_t SoftObject::give_way(const ToolInBody& tool, std::span<ToolBound> ou
 
 void SoftObject::record_depths(const ToolInBody& tool) noexcept {
   const bool flat = tool.shape == ToolInBody::Shape::punch;
-  if (on_grid_ && !flat) return;  // after each cycle no voxel is in the tool that could leave it
+  if (on_grid_ && !flat) return;  // after each cycle, no voxel that could leave the tool is in it
   for (Touch& t : touches_) {
     const glm::dvec3 from = position(t) - tool.centre;
     const double along = glm::dot(from, tool.axis), distance = glm::length(from);

@@ -47,7 +47,7 @@ double SoftObject::energy_J() const noexcept {
 }
 
 std::optional<glm::dvec3> SoftObject::carried_by_anchors_N() const noexcept {
-  if (on_grid_) return std::nullopt;  // patches find it by balance: it would equal the felt force
+  if (on_grid_) return std::nullopt;  // patches find this force by balance, so it would equal the felt one
   const float tight_m = kAtLimit * static_cast<float>(lattice_->min_spacing_m());
   glm::dvec3 carried(0.0);
   for (RowId row = 0; row < lattice_->grid().rows(); ++row) {

@@ -49,7 +49,7 @@ struct PressedPair {
 };
 
 // Makes a pair of two surface voxels that may touch, one of each object. `side` is 0 if the two surfaces face
-// the same way. Then it is unknown on which side of each other the objects are.
+// the same way, because the direction from one object to the other is then unknown.
 [[nodiscard]] PressedPair pair_of(const PosedObject& a, VoxelId in_a, const PosedObject& b,
                                   VoxelId in_b) noexcept;
 
@@ -76,8 +76,8 @@ void claim_pair(const PosedObject& a, const PosedObject& b, const PressedPair& p
 void release_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 
 // Set the pair loads of the voxels (SoftObject::pair_load()) to 0, and add the load of a pair. Before a round
-// of relax_pair(): clear_pair_load() on all pairs, then load_pair() once a pair, so that rounding errors do
-// not accumulate.
+// of relax_pair(), call clear_pair_load() on all pairs, and then load_pair() once a pair. So rounding errors
+// do not accumulate.
 void clear_pair_load(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 void load_pair(const PosedObject& a, const PosedObject& b, const PressedPair& pair) noexcept;
 

@@ -117,9 +117,9 @@ void SoftObject::gather(VoxelId v, std::uint32_t touch) noexcept {
 }
 
 // Returns the sum of the loads of all dependents (N), and adds their stiffness. A dependent pulls a pressed
-// voxel back through links at their limits, and the displacement of such a link does not show how much. So
-// the dependents' own loads are summed. Without them the force would saturate as soon as the chain is at its
-// limits.
+// voxel back through links at their limits. The displacement of such a link does not show the size of the
+// pull. So the dependents' own loads are summed. Without them the force would saturate as soon as the chain
+// is at its limits.
 glm::dvec3 SoftObject::gather_load(glm::dmat3& stiffness) noexcept {
   glm::dvec3 force(0.0);
   gathered_.clear();

@@ -49,8 +49,8 @@ double least_force_N(const VoxelLinks& links, const glm::dvec3& wished, const gl
 
 }  // namespace
 
-// Finds the place of least spring energy on the tool's surface. The energy alone decides where on the surface
-// the voxel lies, so it slides on the tool without friction. This is a projection in the metric of the
+// Finds the place of least spring energy on the tool's surface. The energy alone decides the voxel's place on
+// the surface, so the voxel slides on the tool without friction. This is a projection in the metric of the
 // springs. In each step the surface is replaced by its tangent plane at the last place.
 glm::dvec3 SoftObject::project_on_tool(const ToolInBody& tool, const glm::dvec3& rest,
                                        const glm::dvec3& wished, const glm::dvec3& compliance,

@@ -276,7 +276,7 @@ void ShadowObject::pack_changes() noexcept {
   sort_by_distance();
   near_count_ = 0;
   const std::size_t count = multigrid().log().rows(0).size();
-  // After the sort begin_[d] is where distance d ends.
+  // After the sort begin_[d] is the end of distance d.
   const std::size_t near = near_.first[0] > near_.last[0] ? 0 : std::min<std::size_t>(begin_[0], kMaxAtOnce);
   for (std::size_t n = 0; n < count; ++n) {
     if (n + kAhead < count) fetch_change_ahead(by_distance_[n + kAhead]);

@@ -5,8 +5,8 @@
 // Tick and thread take turns with the shadow, and neither waits for the other:
 //
 // submit()      the tick hands over the rows that changed since the last submission;
-// relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels where they were
-//               submitted, and packs the changes (the result);
+// relax()       the thread runs one whole cycle towards equilibrium, with the pressed voxels at their
+//               submitted places, and packs the changes (the result);
 // apply_near()  later the tick adds the result's rows near the contact: at once, so that no step is felt, or
 //               in parts, while the residual of the parts still to come stays frozen;
 // apply_far()   adds the other rows, some a tick, while the thread relaxes the next submission.
@@ -68,7 +68,7 @@ class ShadowObject {
   // ---- the other thread, between submit() and apply_near() ----
   void relax() noexcept;
   // The result of relax() until it is applied. When a session is replayed, replay_result() installs a
-  // recorded result; relax() must not be called any more then.
+  // recorded result. From then on relax() must not be called.
   struct Result {
     std::vector<RowId> rows;
     std::vector<float> values;  // [row][array][lane], as in a RowDelta
@@ -234,7 +234,7 @@ class ShadowObject {
   LazyArray<RowId> deferred_rows_;
   std::size_t deferred_count_ = 0;
   LazyArray<std::uint8_t> deferred_;                   // [row] 1: in deferred_rows_
-  static constexpr int kDistances = 64;                // a greater distance counts as this one less 1
+  static constexpr int kDistances = 64;                // greater distances count as kDistances − 1
   std::array<std::uint32_t, kDistances + 1> begin_{};  // [distance] first of by_distance_
   LazyArray<std::uint8_t> distance_;  // [n] distance of the nth row in the log from the contact, in rows
   LazyArray<RowId> by_distance_;      // rows of the log, nearest to the contact first
@@ -247,7 +247,7 @@ class ShadowObject {
   std::vector<SubmittedObstacle> submitted_obstacles_;
   std::vector<VoxelId> submitted_held_;
   std::vector<SubmittedContact> submitted_contacts_;  // contacts that slide on the tool
-  std::size_t submitted_pressed_ = 0;  // the tool presses the first so many voxels of submitted_held_
+  std::size_t submitted_pressed_ = 0;  // number of leading voxels of submitted_held_ that the tool presses
   glm::dvec3 submitted_tool_m_{0.0};   // centre of the tool at the submission
   int unsettled_ = 0;                  // results still to come that relax the contact once more
   bool settle_contact_ = false;        // the present result relaxes the contact once more

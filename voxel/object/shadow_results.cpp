@@ -106,7 +106,7 @@ bool ShadowObject::apply_row(SoftObject& object, std::size_t n, float part) noex
   }
   to.add_motion(row, ways, object.state_, object.obstacle_view());
   object.note_moved(row);
-  unsigned others = 0;  // counts all differences; a search for the first one took longer
+  unsigned others = 0;  // counts all differences, which is faster than a search for one
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float* there = object.state_.u[axis].data() + at(row);
     for (std::size_t i = 0; i < kRow; ++i) others += wanted[axis][i] != there[i] ? 1U : 0U;

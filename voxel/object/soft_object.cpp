@@ -106,8 +106,8 @@ std::unique_ptr<SoftObject> SoftObject::copy(Tables tables) const {
 
 double SoftObject::reach(double tool_radius) const {
   // At rest half a cell's diagonal would be enough, but pressed voxels move apart. With 1.5 spacings or more
-  // the tool does not slip between voxels (tested with tools of a hundredth of a spacing, three spacings
-  // deep).
+  // the tool does not slip between voxels. This holds for tools of a hundredth of a spacing, three spacings
+  // deep.
   return std::max(tool_radius + voxel_radius(), 1.5 * lattice_->max_spacing_m());
 }
 

@@ -146,7 +146,7 @@ class SoftObject {
   [[nodiscard]] Reaction reaction(const ToolInBody& tool) noexcept;
   // The tool moves by `delta` (m): each pressed voxel moves by its component along the voxel's normal.
   void follow(const glm::dvec3& delta) noexcept;
-  // Call it at the start of a tick. It records how deep each touched voxel is in the tool.
+  // Call it at the start of a tick. It records the depth of each touched voxel in the tool.
   void record_depths(const ToolInBody& tool) noexcept;
   // Writes bounds of the tool where the chain kept voxels in the tool. A voxel that does not move may stop
   // the tool but must not push it: the tool may stay as deep as it was when the tick began. A voxel that was
@@ -316,7 +316,7 @@ class SoftObject {
   [[nodiscard]] bool any_pressed() const noexcept;
   [[nodiscard]] bool cycle_due() const noexcept;
   [[nodiscard]] std::size_t shared(std::size_t work) const noexcept;
-  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // what this tick has left of `work`
+  [[nodiscard]] std::size_t left_of(std::size_t work) const noexcept;  // part of `work` that is left
   // All arguments and results are displacements from rest. clamp_depth_in_tool() shortens the motion from
   // `now` to `place` so that the voxel gets no deeper into the tool than it is now.
   // project_on_tool_within_limits() finds the least energy on the tool within the links' limits.
@@ -438,9 +438,9 @@ class SoftObject {
     double gap_m;
   };
   std::vector<TouchOnGrid> touches_on_grid_;
-  std::array<int, 3> centre_{};                      // of the contact (voxel)
-  std::uint32_t grid_ticks_ = 0;                     // since the contact began
-  std::array<int, 3> axis_waits_{};                  // how long each axis waits for a cycle, by its force
+  std::array<int, 3> centre_{};      // of the contact (voxel)
+  std::uint32_t grid_ticks_ = 0;     // since the contact began
+  std::array<int, 3> axis_waits_{};  // cycles since each axis was relaxed; with force they count twice
   glm::dvec3 grid_force_N_{0.0}, grid_tool_m_{0.0};  // force and tool position of the last cycle
   ContactEnergy contact_energy_;
   double nearest_m_ = 0.0;  // smallest gap between a voxel and the tool

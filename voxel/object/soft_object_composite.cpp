@@ -39,7 +39,7 @@ constexpr double kNear = 3.0;         // spacings: surface voxels further from t
 constexpr double kFlat = 1.5;  // greatest ratio of spacings for which the width of a ball's contact is known
 
 // Call it before a cycle. It extrapolates the displacements to a tool that moved by `way_m` and has displaced
-// the pressed voxels by `dent_m` on average. Far tissue is scaled; near tissue moves with the tool. If near
+// the pressed voxels by `dent_m` on average. Far tissue is scaled. Near tissue moves with the tool. If near
 // tissue were scaled too, it would leave the tool and be pressed in again.
 void go_along(CompositeGrid& grid, const glm::dvec3& dent_m, const glm::dvec3& force_N,
               const glm::dvec3& way_m, double spacing_m) noexcept {
@@ -64,7 +64,7 @@ std::string SoftObject::use_composite_grid(const ToolInBody& tool, int margin) {
     return "it has fewer than " + std::to_string(kLeastOnGrid) + " voxels";
   assert(obstacles_.empty() && !moved_ever_);  // obstacles are set only after this call
   if (lattice_->max_spacing_m() > kFlat * lattice_->min_spacing_m()) return "its voxels are not cubes";
-  // A ball touches tissue only where its slope is at most the steepest slope that links allow a surface.
+  // A ball touches tissue only where the ball is at most as steep as links allow a surface to be.
   const double h = lattice_->min_spacing_m();
   double steepest = 0.0;
   for (const LinkMaterial& m : lattice_->materials().subspan(1))
@@ -310,8 +310,8 @@ void SoftObject::settle_on_grid(const ToolInBody& tool) noexcept {
   for (int d = 0; d < 3; ++d) centre_[static_cast<std::size_t>(d)] = static_cast<int>(std::lround(sum[d]));
 }
 
-// With a share of the work below 1: as many axes as the share allows, at least one. They take turns, and an
-// axis that carries force has its turn twice as often.
+// Axes to relax if the share of the work is below 1: as many as the share allows, at least one. Axes take
+// turns. An axis that carries force has its turn twice as often.
 std::array<bool, 3> SoftObject::fewer_axes_due() noexcept {
   const int most = std::max(1, static_cast<int>(3.0 * work_share_));
   const double felt = kFelt * glm::length(grid_force_N_);

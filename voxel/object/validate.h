@@ -14,7 +14,8 @@ namespace voxel {
 std::string validate(const Lattice& lattice);
 // Checks three things. Displacements are finite, and 0 at anchors and where there is no voxel. Roles are
 // valid and counted right by row. No link exceeds its limits by more than `roundings` times half the last bit
-// of the largest displacement on its axis. This fails while a chain with a budget is unfinished.
+// of the largest displacement on its axis. The check of links fails while a chain with a budget is
+// unfinished.
 std::string validate(const Lattice& lattice, const Displacement& state, double roundings);
 
 }  // namespace voxel

@@ -10,7 +10,8 @@ namespace voxel {
 
 namespace {
 
-// A voxel that no relax() used in this many further calls of relax() and skip() loses its multipliers.
+// A voxel loses its multipliers when more than this many calls of relax() and skip() in turn did not use
+// them.
 constexpr std::uint32_t kRemembered = 8;
 // Largest extra depth that a voxel may gain in its half-space (unit: spacing).
 constexpr double kDeeper = 1e-3;

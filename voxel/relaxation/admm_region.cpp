@@ -15,7 +15,7 @@ constexpr int kDeep = 3;  // number of layers of neighbours that belong to the r
 constexpr int kFar = 12;  // number of all layers; layers beyond kDeep follow only links at their limits
 constexpr int kSweeps = 30, kTickSweeps = 6;  // sweeps in a round beside moving bodies; in a tick
 constexpr int kToolSweeps = 100;              // sweeps in a round under the tool, which no tick waits for
-constexpr std::uint64_t kOtherWork = 5;       // cost of all work of relax() but its sweeps (unit: sweep)
+constexpr std::uint64_t kOtherWork = 5;       // cost of all work of relax() except sweeps (unit: sweep)
 constexpr double kFurther = 1.6;              // over-relaxation (Boyd et al., 3.4.3)
 // Distances of a link from its limit (unit: spacing). Below the first it is at its limit; below the second it
 // may reach its limit.

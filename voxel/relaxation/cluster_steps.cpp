@@ -17,7 +17,7 @@ constexpr std::uint8_t kIn = 1;                  // bit of mark_: the voxel is i
 // A link nearer to its limit than this blocks motion (unit: spacing).
 constexpr float kExactlyAtLimit = 1e-6F;
 
-// How far u(from) may move before the link to its neighbour stops it.
+// Distance (m) that u(from) may move before the link to its neighbour stops it.
 float room(const Lattice& lattice, const LazyArray<float>& u, VoxelId from, int d, bool up, int axis,
            bool upwards) noexcept {
   const VoxelId to = up ? lattice.up(from, d) : lattice.down(from, d);

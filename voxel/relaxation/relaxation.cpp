@@ -28,7 +28,7 @@ constexpr std::uint64_t kBesideContact = 2;  // the budget is divided by this if
 // Cost of renewing the bricks of a row (unit: voxel update). The budget divided by kBrickShare is spent on
 // bricks.
 constexpr std::uint64_t kBrickUpdates = 4 * kRow, kBrickShare = 2;
-constexpr int kLooksAtOnce = 256;  // tiles searched in one go for pending corrections above them
+constexpr int kLooksAtOnce = 256;  // tiles searched at a time for pending corrections above them
 
 }  // namespace
 

@@ -31,8 +31,9 @@ namespace voxel {
 // An object is at rest if no free voxel is pulled by more than this share of the force scale.
 inline constexpr double kRestingResidual = 1e-5;
 
-// Which tables of the relaxation an object has from the beginning. whole: all, so that no tick pays for one;
-// this is most of an object's memory. where_used: those that are needed, for an object that does not tick.
+// The tables of the relaxation that an object has from the beginning. whole: all tables, so that no tick pays
+// for one. They take most of an object's memory. where_used: only those that are needed, for an object that
+// does not tick.
 enum class Tables : std::uint8_t { whole, where_used };
 
 class AdmmRegion;
@@ -119,7 +120,7 @@ class Relaxation {
     drift_m_ = furthest_m_ = {};
   }
   [[nodiscard]] bool asleep() const { return asleep_ && !shadow_busy_; }
-  // From now on a shadow relaxes the object (shadow_object.h); this Relaxation only relaxes the neighbourhood
+  // From now on a shadow relaxes the object (shadow_object.h). This Relaxation only relaxes the neighbourhood
   // of the contact. Allocates.
   void leave_to_shadow();
   [[nodiscard]] bool left_to_shadow() const { return left_to_shadow_; }

@@ -25,8 +25,7 @@ constexpr double kProgress = 1e-3;  // (unit: spacing) a cluster that moves furt
 // motion of all clusters on an axis exceeds its previous maximum by this much in a round. This is not tested
 // if obstacles touch the object: tissue squeezed between them would keep moving.
 constexpr double kDrift = 2e-5;
-// Stride, in voxels at active limits, from the voxel that a round moves first to the one that the next round
-// moves first.
+// Number of voxels at active limits by which each round starts further on than the round before.
 constexpr std::uint64_t kNextFirst = 7919;
 
 }  // namespace

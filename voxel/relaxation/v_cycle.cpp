@@ -12,8 +12,8 @@ constexpr int kContactSweeps = 4;   // replaces kCoarsestSweeps under asynchrono
 // Levels of a contact cycle under asynchronous relaxation. The shadow relaxes tissue further away. If contact
 // cycles moved the coarsest cells, too, contact cycles and the shadow's cycles would disturb one another.
 constexpr int kContactLevels = 5;
-// What a Float8 of cells costs (unit: the prolongation of a Float8): to smooth it kSmoothed, to restrict it
-// kPassedOn. A Float8 of voxels costs kOfVoxels times as much, because voxels have limits and obstacles.
+// Cost of a Float8 of cells (unit: the prolongation of a Float8): kSmoothed to smooth it, kPassedOn to
+// restrict it. A Float8 of voxels costs kOfVoxels times as much, because voxels have limits and obstacles.
 constexpr std::size_t kSmoothed = 2, kPassedOn = 3, kOfVoxels = 2;
 // Further cycles on the coarse levels alone before voxels get the correction. Each costs an eighth of a whole
 // cycle.

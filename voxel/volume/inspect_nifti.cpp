@@ -118,8 +118,8 @@ Component nifti_component(const fs::path& path, const NiftiHeader& header) {
                 ", where one whole or real number is needed; save one channel of it");
 }
 
-// Reads the number of voxels and the voxel size along the first three axes. A last axis with one voxel and
-// without a size, as slices have, is no axis.
+// Reads the number of voxels and the voxel size along the first three axes. A last axis with one voxel and no
+// size, as in a file of one slice, does not count.
 void read_nifti_axes(const fs::path& path, const NiftiHeader& header, VoxelPlace& place) {
   const int axes = header.at<std::int16_t>(40);
   check_axes(path, axes);

@@ -205,7 +205,7 @@ Component nrrd_component(const fs::path& path, const TextHeader& header) {
 }
 
 // The length units that a field lists: one for each axis, or for each coordinate of the space. Sets
-// `place.stated_unit` to the first unit that is stated. A unit that is not known beside known ones is said.
+// `place.stated_unit` to the first unit that is stated. Adds a note if one unit is known and another is not.
 std::vector<std::optional<double>> nrrd_units(const TextHeader& header, const char* key, VoxelPlace& place) {
   std::vector<std::optional<double>> units;
   std::string unknown;

@@ -148,7 +148,8 @@ std::vector<DicomSlice> read_slices(const fs::path& folder, VolumeHeader& header
   return slices;
 }
 
-// Several slices must state their positions, which give their order and distance. A single slice need not.
+// Several slices must state their positions, which give their order and distance. A single slice need not
+// state a position.
 void check_places(const fs::path& folder, const std::vector<DicomSlice>& slices, VolumeHeader& header) {
   bool spacing = true, orientation = true;
   for (const DicomSlice& slice : slices) {

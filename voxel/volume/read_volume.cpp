@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The library of a format. NIfTI needs none: its header is read by inspect_nifti.cpp, its voxels are
+// The library of a format. NIfTI needs none: its header is read by inspect_nifti.cpp, and its voxels are
 // streamed.
 itk::ImageIOBase::Pointer library_of(VolumeFormat format) {
   if (format == VolumeFormat::nrrd) return itk::NrrdImageIO::New().GetPointer();

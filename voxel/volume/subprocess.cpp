@@ -31,7 +31,7 @@ int run_in_subprocess(const std::function<void()>& call, unsigned cpu_seconds) {
   const pid_t child = fork();
   if (child < 0) return -1;
   if (child == 0) {
-    // The child ends with its caller, also if that is killed.
+    // The child ends with its caller, also if the caller is killed.
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != caller) _exit(0);
     std::signal(SIGABRT, SIG_DFL);

@@ -30,7 +30,7 @@ constexpr const char* kRemedy = "check the folder's permissions and free space";
 enum class Packing { raw, gzip, zlib };
 
 // Writes a file completely or not at all. keep() moves it to the path, or to the target if the path is a
-// symbolic link. Until then the file has no name if the file system allows that, so that it vanishes with the
+// symbolic link. Until then, if the file system allows it, the file has no name and vanishes with the
 // process.
 class TemporaryFile {
  public:
