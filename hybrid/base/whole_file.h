@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Files that are written whole or not at all. The bytes go to a file without a name in the same folder. When
-// all are on the disk, it replaces the target. So a full disk or a kill leaves the old file as it was.
+// all bytes are on the disk, this file replaces the target. So a full disk or a kill leaves the old file as
+// it was.
 #pragma once
 
 #include <cstddef>
