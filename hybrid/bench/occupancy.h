@@ -56,8 +56,8 @@ std::vector<OccupancyRow> bench_occupancy(const OccupancyBenchOptions& options);
 nlohmann::ordered_json to_json(const OccupancyRow& row);
 std::string occupancy_table_head();
 std::string occupancy_table_line(const OccupancyRow& row);
-// Compares the map of an object with all voxels and that with only the surface. Also lists the rows in which
-// the map is not better than another engine. Empty: there are no such rows.
+// Compares two maps of each object: with all its voxels, and with only its surface. Then lists the rows in
+// which the map is slower than another engine, and compares the memory of map and tree.
 std::string occupancy_summary(const std::vector<OccupancyRow>& rows);
 
 }  // namespace hybrid::bench

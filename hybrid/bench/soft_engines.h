@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The engines that spread a wave, behind one interface, so that all get the same inputs in the same run. Also
-// these inputs, and an inspection of the result that shares no code with any engine.
+// The engines that spread a wave, behind one interface, so that all get the same inputs in the same run. The
+// header also has these inputs, and an inspection of the result that shares no code with any engine.
 #pragma once
 
 #include <array>

@@ -39,8 +39,8 @@ struct ThreadsRow {
 //                    surfaces.
 //   memory           the session under `relaxation` is played again with its inputs, while a thread copies
 //                    256 MB between two buffers. Each tick gets the same asynchronous results as under
-//                    `relaxation`. The copying thread writes them, so another core wrote them here, too.
-//   nothing relaxed  as `memory`, but no result ever arrives: the cost of ticks that have less to do.
+//                    `relaxation`. The copying thread writes them, so that here too they come from another
+//   core. nothing relaxed as `memory`, but no result ever arrives: the cost of ticks that have less to do.
 // Throws SceneError.
 std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options);
 

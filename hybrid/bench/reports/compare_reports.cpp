@@ -146,9 +146,8 @@ bool same_basis(const MatchedRows& rows, std::string_view basis) {
   return all_equal(values);
 }
 
-// Is the figure judged by the rank test? Measured figures are. So are exact figures that the reports do not
-// show to be exact: their values differ between the old runs, or between the new runs if there is a single
-// old run.
+// Is the figure judged by the rank test? Every measured figure is. An exact figure is too if its values
+// differ between the old runs. With a single old run, its values in the new runs decide.
 bool is_ranked(const ReportKey& key, const MatchedRows& rows, const ComparedFigure& figure) {
   if (key.kind == KeyKind::measured) return true;
   if (!all_numbers(figure.old_values) || !all_numbers(figure.new_values)) return false;

@@ -62,7 +62,7 @@ struct ReportComparison {
   std::vector<std::string> only_old, only_new;  // rows that only one side has
   struct Tested {
     std::size_t figures = 0;
-    // Least number of changed figures for the test to name any; 0: it never can.
+    // Least number of changed figures at which the test can name any of them; 0: no number suffices.
     std::size_t at_once = 0;
     std::size_t runs_for_one = 0;  // runs on each side that are needed to name a single figure
   };

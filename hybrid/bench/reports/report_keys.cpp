@@ -178,7 +178,7 @@ constexpr std::array kThesisKeys{
     ReportKey{"speed_mm_per_s", identity},
     ReportKey{"elements", detail},
     ReportKey{"thesis_percent", detail},
-    ReportKey{"ticks", context},             // of a cube that is late the session ends early
+    ReportKey{"ticks", context},             // the session of a late cube ends early
     ReportKey{"force_error_jnd", measured},  // the largest cube depends on the machine
     ReportKey{"voxels", measured},
     ReportKey{"edge", measured},

@@ -30,8 +30,9 @@ struct Vigour {
 };
 const std::vector<Vigour>& vigours();
 
-// Times of the ticks of one session. Of classic: its six-direction check, its chain and its force. Its
-// relaxation, which the thesis gave a thread of its own, is not in them. Of the product: the whole tick.
+// Times of the ticks of one session. A tick of classic is its six-direction check, its chain and its force.
+// The relaxation of classic does not count, because the thesis ran it on its own thread. A tick of the
+// product is the whole tick.
 struct StudyTicks {
   std::uint64_t ticks = 0;
   Percentiles tick_us;
