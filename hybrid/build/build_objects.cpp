@@ -78,7 +78,7 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-// Adds notes for the user: the repairs by the file's reader.
+// Adds a note for the user on each repair by the file's reader.
 void add_notes(const std::string& object, const std::filesystem::path& file,
                const std::vector<std::string>& of_file, std::vector<BuildNote>& notes) {
   for (const std::string& note : of_file)
