@@ -30,8 +30,8 @@ Scene bare(const Scene& scene) {
   return one;
 }
 
-// The rigid object as a soft object of the same shape and of material "hard". Empty if the object has no
-// voxels. That holds for a sheet, for a body thinner than two voxels, and for a mesh, which may be open.
+// The rigid object as a soft object of the same shape and of material "hard". Empty for a sheet, for a body
+// thinner than two voxels, and for a mesh, which may be open.
 std::optional<SoftDescription> as_soft(const RigidDescription& rigid) {
   SoftDescription soft{.name = rigid.name,
                        .source = {},
