@@ -296,8 +296,8 @@ struct Chosen {
   HeightMap::Spot spot;
 };
 
-// The way over the surface from one place of contact to another, without its ends. Where the surface is steep
-// or missing, the tool is lifted over it by `lift_m`.
+// The path over the surface between two places of contact, without these two places. Where the surface is
+// steep or missing, the tool is lifted over it by `lift_m`.
 std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, const glm::dvec3& to,
                                double radius_m, double lift_m) {
   const double way = map.across(from, to);
