@@ -26,9 +26,9 @@ std::string models_verdict(const ModelsInScene& models, const ObjectModels& obje
 std::string models_words(const ModelsInScene& models);
 // The reference and its own error; the meaning of the figures; notes. One sentence or so a line.
 std::string models_legend(const ModelsInScene& models);
-// How far the model's stiffness is off that of the reference, as a share; empty if either has none.
+// Relative error of the model's stiffness against the reference's. Empty if either has no stiffness.
 std::optional<double> stiffness_off(const ModelRow& row, const ObjectModels& object);
-// How much later than the reference the model is felt (ms); empty if either is not felt.
+// Delay of the model's onset after the reference's (ms). Empty if either is not felt.
 std::optional<double> onset_later_ms(const ModelRow& row, const ObjectModels& object);
 nlohmann::ordered_json models_json(const ModelsInScene& models);
 // For each object: forces and differences from the reference over time, and force over depth.
