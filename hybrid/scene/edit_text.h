@@ -19,8 +19,8 @@ struct TextTable {
   std::string part{};  // empty: the table or item itself
 };
 
-// It parses the text again after each change. A change is kept only if the text then reads as before, but for
-// the value that was set.
+// The text is parsed again after each change. A change is kept only if nothing but the value that was set
+// reads differently.
 class SceneTextEditor {
  public:
   // `file` is used in messages. Throws SceneError: the text is no TOML.
