@@ -15,8 +15,8 @@
 
 namespace hybrid {
 
-// Slow-down factors of the two references while the device moves. Where a lag falls with the slowness, or
-// with its root, the quick reference finds 0.89 or 0.81 of the error that the full one finds.
+// Slow-down factors of the two references while the device moves. If a lag is inversely proportional to the
+// factor, or to its root, the quick reference finds 0.89 or 0.81 of the error that the full one finds.
 inline constexpr int kQuickSlower = 5, kSlower = 10;
 // Below this speed the device counts as still: a tenth of a millimetre in 0.1 s.
 inline constexpr double kStill_m_per_s = 1e-3;

@@ -29,8 +29,8 @@ namespace hybrid {
 // for the energy of the clamped spring. A slew limit delays a change ΔF of the force and may give |ΔF|·|Δx|
 // more. This is added to the allowed energy, and is zero where the limit did not act. Tissue is not solved to
 // equilibrium within a tick. A wave may store energy in it that the hand has not paid for, and return it. So
-// with tissue, kTissueShare of moved_J() is allowed besides. That bounds this engine's error and is no
-// theorem.
+// with tissue, kTissueShare of moved_J() is allowed besides. This allowance is measured for this engine, and
+// is no theorem.
 //
 // outside. The proxy's centre is no nearer to a rigid object than the proxy's radius, within rounding.
 class TickInvariants {
