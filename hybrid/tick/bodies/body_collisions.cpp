@@ -44,7 +44,8 @@ class Collisions : private CollisionQueries {
       place_after();
       if (follow_ways(round)) break;
       if (round < kRounds) continue;
-      ++all_.round;  // voids queries made on ways, because bodies that stand still did not go there
+      ++all_.round;  // makes the queries on ways invalid, because a body that stands still did not take its
+                     // way
       place_after();
       break;
     }

@@ -21,8 +21,8 @@ namespace hybrid {
 // Spacings: a body that is deeper in tissue at the end of a step or tick is moved back.
 inline constexpr double kTooDeep = 0.02;
 
-// Depth in spacings by which a body may overlap a jammed voxel. Some overlap must remain: a voxel that can
-// leave again shows it by a smaller overlap.
+// Depth in spacings by which a body may overlap a jammed voxel. Some overlap must remain, because a smaller
+// overlap shows that the voxel can leave again.
 inline constexpr double kJammedProbe = 0.01;
 
 // The smallest spacing of all soft objects (m); there must be one.
