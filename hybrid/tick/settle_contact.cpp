@@ -69,7 +69,7 @@ struct OutsideRigid {
 
 // The point nearest to `target` in the metric, outside rigid objects near the proxy and outside the planes
 // that add_others() appends to scratch.planes. Rigid planes are searched up to a radius around the proxy. If
-// the point found is nearer to the proxy than that, no plane that was missed can change it.
+// the point found is nearer to the proxy than this radius, no plane that was missed can change it.
 template <class AddOthers>
 OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const glm::dvec3& target,
                                     const polygon::Metric& metric, AddOthers&& add_others) noexcept {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kMaxSteps = 64;      // steps of one sweep
 constexpr std::uint32_t kMaxExchanges = 64;  // planes added or renewed in one step
-constexpr std::uint32_t kMaxCrossings = 16;  // of nearly flat edges, in one sweep
+constexpr std::uint32_t kMaxCrossings = 16;  // crossings of nearly flat edges in one sweep
 // A shorter step ends the sweep; relative to the way to the target, and to the ball's radius.
 constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
 // When no plane holds the proxy any more, the next obstacle is near. So the first search covers only a part
@@ -159,8 +159,8 @@ class Sweeper {
     return true;
   }
 
-  // Is the point reached better than the minimum that was skipped for it? If not, returns to that minimum and
-  // takes no round step for a while.
+  // Is the cost at the point reached lower than at the minimum that the round step skipped? If not, returns
+  // to that minimum and takes no round step for a while.
   bool round_step_paid() noexcept {
     const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
     constexpr double kSame = 1.0 + 1e-14;  // allows for rounding of the cost
@@ -205,7 +205,7 @@ class Sweeper {
         held = from;
         set_viewpoint(point);
         around_.renew_planes(point);
-        // The known neighbourhood ends on this way: look there first.
+        // The known neighbourhood ends on this way, so it is queried there first.
         if (around_.range_cut_way()) return Crossing::moved;
         break;
       }
@@ -393,8 +393,9 @@ class Sweeper {
   std::uint32_t held_count_ = 0;
   polygon::PlaneMinimum minimum_;
   struct RoundStep {
-    bool taken = false;                     // the last step was a round step
-    std::uint32_t waits = 0, patience = 1;  // steps until the next round step, since one did not pay
+    bool taken = false;  // the last step was a round step
+    std::uint32_t waits = 0,
+                  patience = 1;  // steps until the next round step; it doubles after each that did not pay
     glm::dvec3 instead{0.0}, to{0.0};
   } round_;
   std::uint32_t crossings_ = 0;

@@ -55,8 +55,8 @@ void submit(WorldState& state, AsyncObject& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.shadow.work() / kRowsRelaxed;
 }
 
-// A result in real time is late by the work of its cycle, which grows with the number of voxels. A reference
-// that has its results as late comes the less to rest the finer its lattice is.
+// Results arrive at once. In real time a result is late by the work of its cycle, which grows with the number
+// of voxels. With such a delay, a reference on a finer lattice would be further from rest.
 void exchange_at_once(WorldState& state, std::size_t o) noexcept {
   AsyncObject& object = *state.async.objects[o];
   voxel::SoftObject& soft = *state.soft[o];
