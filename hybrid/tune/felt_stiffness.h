@@ -11,8 +11,9 @@
 
 namespace hybrid {
 
-// Just noticeable differences of the compliance, as shares. With the finger on the surface 15 %; through a
-// rigid tool more than three times as much (Bergmann Tiest & Kappers, IEEE Trans. Haptics 2(4):189, 2009).
+// Just noticeable differences of the compliance, as shares. With the finger on the surface it is 15 %, and
+// through a rigid tool more than three times as much (Bergmann Tiest & Kappers, IEEE Trans. Haptics 2(4):189,
+// 2009).
 inline constexpr double kStiffnessJndFinger = 0.15, kStiffnessJndTool = 0.45;
 // Smallest angle between two forces that a hand notices by touch alone (Barbagli, Salisbury, Ho, Spence &
 // Tan, ACM Trans. Applied Perception 3(2), 2006). With vision of the contact it is 18.4 degrees.
