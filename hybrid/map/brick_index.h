@@ -208,7 +208,7 @@ class BrickIndex : public BrickGrid {
   }
 
   // Makes the bitmap over the existing bricks, and room for `more` bricks. These need no allocation when they
-  // are added. Those beyond the bitmap share its outermost units.
+  // are added. Bricks beyond the bitmap share its outermost units.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     table_.seal(more, moved);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The models of each object of a scene side by side: each variant of the scene is played whole, along the
-// scene's path, by the engine of `run` on an ideal device, and compared with one reference.
+// The models of each object of a scene side by side. Each variant of the scene is played whole, along the
+// scene's path, by the engine of `run` on an ideal device. All are compared with one reference.
 #pragma once
 
 #include <filesystem>

@@ -254,7 +254,8 @@ std::optional<std::size_t> cheapest_untold(const ObjectModels& object) {
   for (std::size_t n = 0; n < object.rows.size(); ++n) {
     const ModelRow& row = object.rows[n];
     if (!row.left_out.empty() || !row.faults.empty() || told_through_tool(row, object)) continue;
-    if (row.coupling_N_per_m() && !object.alone) continue;  // it would change the other objects, too
+    if (row.coupling_N_per_m() && !object.alone)
+      continue;  // another coupling would change the other objects, too
     untold.push_back(n);
     least_us = std::min(least_us, row.tick_us.p999);
   }

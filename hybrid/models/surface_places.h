@@ -30,9 +30,9 @@ class SurfacePlaces {
   // The greatest distance of a vertex from its nearest place.
   [[nodiscard]] double gap_m() const;
 
-  // The value at each vertex, from the values of all places in their order: the mean of the places nearest to
-  // the vertex, weighted by distance (Franke & Little 1980). NaN is a value that is not known. If the nearest
-  // place has no known value, the vertex has none either.
+  // The value at each vertex, from the values of all places in their order. It is the mean of the places
+  // nearest to the vertex, weighted by distance (Franke & Little 1980). NaN is a value that is not known. If
+  // the nearest place has no known value, the vertex has none either.
   [[nodiscard]] std::vector<float> spread(std::span<const float> of_places) const;
   // The part of the surface around each vertex (m²). Their sum is the surface's area.
   [[nodiscard]] const std::vector<double>& areas_m2() const { return areas_m2_; }
@@ -42,7 +42,7 @@ class SurfacePlaces {
   struct Vertex {
     glm::vec3 at{0.0F}, facing{0.0F};             // m, from the middle of the surface; normal · apart_m
     std::array<std::uint32_t, kNearest> place{};  // the nearest places, the nearest first
-    std::array<float, kNearest> squared{};        // of their distances (m²)
+    std::array<float, kNearest> squared{};        // squares of the distances (m²)
   };
 
   std::vector<Vertex> vertices_;

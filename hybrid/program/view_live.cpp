@@ -43,7 +43,7 @@ class PressWatch {
   static constexpr std::chrono::milliseconds kEvery{200};  // least time between two updates of the list
   static constexpr int kRest = 19;  // the session is held for at most one part in 20 of the time
   std::vector<PairPress> presses_;
-  std::uint64_t tick_ = kNever;  // of presses_
+  std::uint64_t tick_ = kNever;  // tick of presses_
   std::chrono::steady_clock::time_point next_{};
 };
 
@@ -75,7 +75,7 @@ SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) 
   return notes;
 }
 
-// Changes to the changed scene once that scene is built. Returns true if the scene was changed.
+// The session goes on in the changed scene once that scene is built. Returns true if the scene was changed.
 bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, LiveSession& session,
                         const PlayRequest& request) {
   try {

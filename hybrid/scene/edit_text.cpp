@@ -220,7 +220,7 @@ bool SceneTextEditor::comment_above(const TextTable& table, const std::vector<st
   return true;
 }
 
-// A line within a string may look like a comment. Without it the text reads differently, so all lines stay.
+// A line within a string may look like a comment. If its removal changes a value, all lines stay.
 void SceneTextEditor::remove_comments(std::string_view begin) {
   std::string changed = text_without(begin);
   try {

@@ -11,8 +11,8 @@
 
 namespace hybrid {
 
-// A table of a scene: {"tool"}, the item of a list by its key `name` as {"rigid", "plate"}, or a table within
-// one of these as {"rigid", "plate", "texture"} and {"material", "", "fat"}.
+// A table of a scene: {"tool"}. The item of a list by its key `name`: {"rigid", "plate"}. A table within one
+// of these: {"rigid", "plate", "texture"} and {"material", "", "fat"}.
 struct TextTable {
   std::string key;
   std::string name{};  // empty: `key` is a table, not a list

@@ -99,7 +99,7 @@ using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlaneP
 struct SpinDescription {           // rotation about an axis that follows the path
   glm::dvec3 axis{0.0, 0.0, 1.0};  // unit vector, scene frame
   glm::dvec3 about_m{0.0};         // a point of the axis at the start, scene frame
-  double rate_rad_per_s = 0.0;     // rate of endless rotation; without effect unless amplitude_rad is 0
+  double rate_rad_per_s = 0.0;     // rate of endless rotation; used only if amplitude_rad is 0
   double amplitude_rad = 0.0, frequency_hz = 0.0;
 };
 struct PathMotion {
@@ -208,8 +208,8 @@ struct SoftDescription {
   int split = 1;
   bool patches = true;               // false: never on nested patches. Set by baselines; no key of a scene.
   Energy energy = Energy::six_link;  // energy of materials that state none
-  // As in the file. load_scene() moves objects that are felt through the proxy to Scene::rigid, so all that
-  // stay in Scene::soft are felt through their voxels.
+  // As in the file. load_scene() moves objects that are felt through the proxy to Scene::rigid. All objects
+  // that stay in Scene::soft are felt through their voxels.
   SoftModel model = SoftModel::voxels;
   SourcePlace place, source_place;
 };

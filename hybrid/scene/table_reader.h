@@ -69,7 +69,7 @@ struct SceneSource {
 // A key or a value that is not supported yet.
 struct UnsupportedKey {
   std::string_view name;
-  std::string_view meanwhile;  // what to do until then
+  std::string_view meanwhile;  // an alternative for the user until then
 };
 
 // The length units that a person may name, in meters.

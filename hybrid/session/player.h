@@ -92,7 +92,7 @@ class Player {
   // Ticks whose figures may wait for a frame: eight seconds at 1 kHz.
   static constexpr std::size_t kSamples = 8192;
 
-  // States of the session that are kept to go back to: of the last minute, one a second, or as many as fit
+  // Kept states, to which the session can go back: one for each second of the last minute, or as many as fit
   // into this memory.
   static constexpr double kKept_s = 60.0, kKeepEvery_s = 1.0;
   static constexpr std::size_t kMostKeptBytes = std::size_t{512} << 20;

@@ -126,7 +126,7 @@ Scene scene_of_text(const Recording& recording, const std::string& text) {
   return scene;
 }
 
-// The scene of a recording. Throws std::runtime_error if its file is not as it was, and SceneError.
+// The scene of a recording. Throws std::runtime_error if its file has changed, and SceneError.
 Scene recorded_scene(const Recording& recording) {
   const std::filesystem::path& file = recording.scene_file;
   if (!file.has_filename()) return scene_of_text(recording, recording.scene_text);
@@ -138,7 +138,8 @@ Scene recorded_scene(const Recording& recording) {
 }
 
 // The device of the recording may not be connected now, and may differ from the scene's. Its force limit says
-// whether it was ideal: only an ideal device has none. The other devices differ in their limits alone.
+// whether it was ideal, because only an ideal device has none. The other devices differ in their limits
+// alone.
 void use_recorded_device(Scene& scene, const device::DeviceLimits& limits) {
   scene.opened_limits = limits;
   if (std::isinf(limits.max_force_N) == is_ideal(scene)) return;

@@ -149,7 +149,7 @@ struct PairPress {
 // The difference that a hand would feel between two models of an object, at each vertex of its surface. The
 // tool is pressed in to the same depth at each vertex, and stands still until all tissue is at rest.
 struct FeltDifference {
-  std::uint64_t comparison = 0, number = 0;  // comparisons so far; rises with each new result
+  std::uint64_t comparison = 0, number = 0;  // number of the comparison; number of the result
   std::size_t object = 0;                    // of DrawnScene::objects
   std::vector<float> jnd{};                  // [vertex] NaN: not known, because the tool cannot come there
   std::size_t places = 0, pressed = 0;       // places that were tried; those with both forces

@@ -9,7 +9,7 @@
 namespace hybrid {
 
 struct ScanPair {
-  // Name of its row and of its folder. No two scans of a study have the same name, not even in other case.
+  // Name of its row and of its folder. The names of any two scans of a study differ by more than case.
   std::string name{};
   std::filesystem::path scan{};    // a volume, or a folder of a DICOM series; empty: only labels are known
   std::filesystem::path labels{};  // empty: the study has no labels, or `unpaired` says why

@@ -16,11 +16,11 @@ namespace hybrid {
 // may move, because its motion would go on in tissue that begins at rest.
 [[nodiscard]] std::string why_no_take_over(const World& before, const World& after);
 
-// `state` is at rest in `world` and goes on where `before` is. Clock, force limits, passivity and edited
-// values go on; values of an object go to the object of the same name. Tissue begins at rest. The tool is put
-// outside everything, and is then pressed in with the device at its present place until the force is steady.
-// The ticks of this press do not count. The same arguments give the same state, bit by bit. Allocates.
-// Returns false if there is no free place for the tool; `state` is useless then.
+// `state`, which is at rest in `world`, continues the session of `before`. Clock, force limits, passivity and
+// edited values go on; values of an object go to the object of the same name. Tissue begins at rest. The tool
+// is put outside everything, and is then pressed in with the device at its present place until the force is
+// steady. The ticks of this press do not count. The same arguments give the same state, bit by bit.
+// Allocates. Returns false if there is no free place for the tool; `state` is useless then.
 [[nodiscard]] bool take_over(const World& before_world, const WorldState& before, const World& world,
                              std::unique_ptr<WorldState>& state);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Plays a scene with one setting along a motion, at normal speed (forces, times of ticks, size) or from pose
-// to pose, with tissue at rest in each (forces for the truth).
+// Plays a scene with one setting along a motion. A session at normal speed gives forces, times of ticks and
+// size. A session from pose to pose, with tissue at rest in each, gives the forces of the truth.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The truth with which settings are compared: the scene's own voxels with accurate energy and without
-// thinning, each tissue at rest under the tool, in poses along the motion. Its voxels are data, because
-// labels say nothing about the inside of a voxel. So two differences are kept apart. The difference of a
-// setting from the scene is the error of the setting. The truth's own error is only that it is not quite at
-// rest. The difference of the scene from tissue that is divided more finely is a property of the scene, and
-// is the same for all settings.
+// thinning. In poses along the motion all tissue is at rest under the tool. The scene's voxels are data,
+// because labels say nothing about the inside of a voxel. So two differences are kept apart. The difference
+// of a setting from the scene is the error of the setting. The truth's own error is only that it is not quite
+// at rest. The difference of the scene from tissue that is divided more finely is a property of the scene,
+// and is the same for all settings.
 #pragma once
 
 #include <functional>

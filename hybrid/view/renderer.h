@@ -41,11 +41,10 @@ class Renderer {
 
   // Sets how the following frames show the scene.
   void set_view(const ViewSettings& view);
-  // A frame whose views and overlay are as before costs no drawing. Otherwise only the changed part of each
-  // view is drawn (view_changes.h).
   // Starts a frame and uploads the snapshot's moving vertices. Width and height are 1 to 8192 pixels;
   // otherwise throws std::runtime_error. `tissue` has taken the snapshot. `scene` must be the scene that the
-  // renderer was made from.
+  // renderer was made from. A frame whose views and overlay are as before costs no drawing. In other frames
+  // only the changed part of each view is drawn (view_changes.h).
   void begin(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue, int width,
              int height);
   // Draws the scene into a part of the frame, over its content. A frame has two such views at most.

@@ -15,7 +15,7 @@ namespace hybrid {
 
 inline constexpr glm::vec4 kKeepAll{0.0F, 0.0F, 0.0F, 1.0F};  // a plane that clips nothing
 
-// A picture cuts an object in which one material hides another: the part towards the eye is left out, and the
+// A picture cuts an object in which one material hides another. The part towards the eye is left out, and the
 // face of the cut shows the materials.
 // The cut is a plane through the tool along the force, with its normal towards the eye. There is a cut only
 // if the tool presses the object, the object hides a material, and the snapshot has the displacements within
@@ -26,7 +26,8 @@ inline constexpr glm::vec4 kKeepAll{0.0F, 0.0F, 0.0F, 1.0F};  // a plane that cl
 struct GlSection {
   GlMesh mesh;
   GlName image = 0;
-  std::uint64_t image_number = 0, shape_number = 0, moved_number = 0;  // as uploaded; of TissueSlice
+  std::uint64_t image_number = 0, shape_number = 0,
+                moved_number = 0;  // numbers of the TissueSlice at the last upload
 
   void upload(const Section& section, const DrawMesh& moved, const SectionImage& image_of_section);
   void release();

@@ -20,7 +20,7 @@ void label_beside(const Pen& pen, const std::string& words);
 // Writes a label in a line of controls.
 void label(const std::string& words);
 void same_line();
-// Controls between these two do not react if `fixed`.
+// Controls between begin_fixed(true) and end_fixed() do not react.
 void begin_fixed(bool fixed);
 void end_fixed();
 

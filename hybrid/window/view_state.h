@@ -77,7 +77,8 @@ struct ViewState {
   bool go_on = false;
   std::vector<Edit> edits{};
   std::vector<SceneChange> changes{};
-  std::optional<ModelComparison> comparison{};                     // to begin; without an object: to end
+  std::optional<ModelComparison>
+      comparison{};  // comparison to begin; without an object: the present one ends
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look

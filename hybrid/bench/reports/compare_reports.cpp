@@ -17,8 +17,8 @@ namespace {
 
 using Row = nlohmann::ordered_json;
 
-// The least changes that a user notices: a tick that takes one period of 1 kHz longer, and a second of
-// waiting.
+// The least changes that a user notices: a tick that is longer by one period of 1 kHz, and a wait that is
+// longer by a second.
 constexpr double kTickPeriod_us = 1e3, kWait_us = 1e6;
 
 struct MatchedRows {
@@ -185,7 +185,7 @@ void judge_ranked(ComparedFigure& figure) {
 }
 
 // Judges the figures of a family together. Figures whose values are all equal are left out: they carry no
-// information, however the runs are divided into old and new ones.
+// information for any division of the runs into old and new ones.
 void judge_family(Family family, ReportComparison& comparison) {
   std::vector<ComparedFigure*> members;
   std::vector<double> p;

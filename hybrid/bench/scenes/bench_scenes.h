@@ -41,8 +41,8 @@ struct SceneRow {
   std::vector<std::string> faults{};
 };
 
-// The p99 of a row differs more between repeats than this share of its median: the machine was too noisy to
-// tell smaller differences.
+// If the p99 of a row differs more between repeats than this share of its median, the machine was too noisy
+// to tell smaller differences.
 inline constexpr double kNoisy = 0.2;
 [[nodiscard]] bool noisy(const SceneRow& row);
 

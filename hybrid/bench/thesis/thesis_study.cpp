@@ -134,7 +134,7 @@ class Study {
   }
   static const Vigour& normal() { return *std::ranges::find(vigours(), "normal", &Vigour::name); }
 
-  // A late session is played once more: another program may have held the processor up.
+  // A late session is played once more, because another program may have used the processor.
   template <class Play>
   StudyTicks played_until_in_time(const Play& play) const {
     const StudyTicks first = play();

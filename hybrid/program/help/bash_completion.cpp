@@ -9,8 +9,8 @@
 namespace hybrid {
 namespace {
 
-// Functions that every completion uses. The last part of a list with commas is completed by itself. With
-// --option=value bash has the '=' as a word of its own.
+// Functions that every completion uses. The last part of a list with commas is completed by itself. In
+// --option=value bash takes the '=' as a separate word.
 constexpr const char* kHead =
     R"(# Completions of the program hybrid, for bash. Written by `hybrid --bash-completion`.
 _hybrid_words() {

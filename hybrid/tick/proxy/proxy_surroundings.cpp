@@ -33,8 +33,8 @@ constexpr double kMostBeforeGrowth = 2.0 * kGoodCount;
 // Work in units of one listed element: of a survey in addition to its elements, and of a renewed plane.
 // kPlanesOfWork: number of planes that are read at the cost of one element.
 constexpr std::uint32_t kWorkOfSurvey = 32, kWorkOfPlane = 2, kPlanesOfWork = 64;
-// The proxy is at the pole of a fan if a survey finds more than kPoleCount times the elements of the last
-// one, although its margin is less than kPoleMargin times the last margin.
+// The proxy is at the pole of a fan if a survey with less than kPoleMargin times the last margin finds at
+// least kPoleCount times the elements of the last survey.
 constexpr double kPoleCount = 0.7;
 constexpr double kPoleMargin = 0.6;
 constexpr double kRangeGrowth = 4.0;  // growth of the range when it cut a step
@@ -136,9 +136,9 @@ bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool mov
 }
 
 // Centre and reach of a survey, such that the proxy may move by the margin along the surface, and further
-// ahead. If the centre is t above the surface and the reach is s, a ball of radius r may touch the elements
-// within about sqrt(2 r (s − t)) of the contact. The higher the centre, the smaller s − t, and the fewer the
-// elements.
+// ahead. Let the centre be t above the surface, and let the reach be s. Then a ball of radius r may touch the
+// elements within about sqrt(2 r (s − t)) of the contact. The higher the centre, the smaller s − t, and the
+// fewer the elements.
 ProxySurroundings::Reach ProxySurroundings::reach_of(const RigidState& near, const glm::dvec3& view,
                                                      bool moving) const noexcept {
   const double margin = near.margin_m;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMaxAsync = 64;  // bits of AsyncRelaxation::arrived
 // Rows of a result that are applied per tick: at most kMaxRowsApplied, which take about 100 µs. In a tick
-// with a cycle of a large contact patch, the remaining work of the tick is the limit; a row counts as
+// with a cycle of a large contact patch, the remaining work of the tick is the limit. A row then counts as
 // kWorkOfRow, including its obstacle queries. But at least kLeastRows are applied, because a result that
 // waits delays the next one.
 constexpr std::size_t kMaxRowsApplied = 250, kLeastRows = 100, kWorkOfRow = 16;

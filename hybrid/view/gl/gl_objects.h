@@ -51,7 +51,7 @@ void bind_image(GlName image);  // to the first unit
 GlName link_program(const char* vertex, const char* fragment);
 void delete_program(GlName program);
 
-// Which planes of the program in use clip: that of a cut, and that of the view.
+// Selects which planes of the program in use clip: the plane of a cut, and that of the view.
 void clip_by_planes(bool cut, bool view);
 // Are the backs of triangles left out?
 void hide_backs(bool hidden);
