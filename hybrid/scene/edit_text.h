@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The editor of a scene's text. Only the values that are set change: comments, order and layout stay.
+// The editor of a scene's text. It sets values; comments, order and layout stay.
 #pragma once
 
 #include <filesystem>
@@ -19,8 +19,8 @@ struct TextTable {
   std::string part{};  // empty: the table or item itself
 };
 
-// The text is parsed again after each change. A change is kept only if nothing but the value that was set
-// reads differently.
+// The text is parsed again after each change. A change is kept only if no value differs but the one that was
+// set.
 class SceneTextEditor {
  public:
   // `file` is used in messages. Throws SceneError: the text is no TOML.

@@ -32,7 +32,7 @@ struct CloseWindow {
 
 enum class Drag { none, orbit, pan, tool, slice, object };
 
-constexpr int kMostPixels = 8192;        // most pixels along a side of a frame
+constexpr int kMostPixels = 8192;        // greatest number of pixels along a side of a frame
 constexpr double kIdle_s = 1.0 / 120.0;  // wait for input after a frame in which nothing changed
 constexpr double kDepthStep = 0.01;  // of the dragged tool, for a turn of the wheel (unit: the view's height)
 constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets

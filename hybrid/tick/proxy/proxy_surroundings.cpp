@@ -241,8 +241,8 @@ void ProxySurroundings::first_in_object(std::uint32_t o, const glm::dvec3& q, do
   constexpr double kWholeWay = 2.0;  // no part of the way is cut
   const auto clear_part = [&](const polygon::SeparatingPlane& plane) {
     const auto depth = [&plane](const glm::dvec3& at) { return plane.offset - glm::dot(plane.normal, at); };
-    // The way leaves a plane that only its first part violates: there the proxy is on the wrong side by
-    // rounding.
+    // If only the first part of the way violates a plane, the proxy is on the wrong side by rounding. Such a
+    // plane does not end the way.
     if (!(depth(end) > tolerance && depth(goal) > tolerance)) return kWholeWay;
     return polygon::Neighbourhood::fraction_before(plane, view, end);
   };
