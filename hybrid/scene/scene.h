@@ -94,8 +94,8 @@ struct VolumeSurfaceSource {
 };
 using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlanePrimitive, CapsulePrimitive,
                                  VolumeSurfaceSource>;
-// Prescribed motion of a rigid object, which no contact changes. The object's `position` and `rotation` are
-// its pose at the start.
+// Prescribed motion of a rigid object. No contact changes this motion. The object's `position` and `rotation`
+// are its pose at the start.
 struct SpinDescription {           // rotation about an axis that follows the path
   glm::dvec3 axis{0.0, 0.0, 1.0};  // unit vector, scene frame
   glm::dvec3 about_m{0.0};         // a point of the axis at the start, scene frame
