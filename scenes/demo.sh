@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# From a bare Debian 12 to a touched head: a plot of what the hand felt, and a picture of the scene.
+# On a bare Debian 12: builds the program, runs a session with a head, and draws a plot of the force and a picture.
 # shellcheck source-path=SCRIPTDIR source=../cmake/setup.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/../cmake/setup.sh"
 

@@ -11,8 +11,8 @@ namespace hybrid {
 // Length in bytes of the character that begins at byte `at`; 0: the bytes there are not UTF-8 (RFC 3629).
 std::size_t character_at(std::string_view text, std::size_t at);
 
-// The same, but 0 also for a character that may not be printed as it is: control characters, line and
-// paragraph separators, and marks that turn the direction of the text after them.
+// The same, but also 0 for a character that must not be printed as it is. These are control characters, line
+// and paragraph separators, and marks that turn the direction of the text.
 std::size_t printable_at(std::string_view text, std::size_t at);
 bool is_printable(std::string_view text);
 

@@ -16,7 +16,7 @@ inline std::string number_text(double value, std::chars_format format, int preci
 }
 }  // namespace detail
 
-// A number with so many decimals: "1.250" with three.
+// A number with `decimals` decimals: "1.250" with three.
 inline std::string with_decimals(double value, int decimals) {
   return detail::number_text(value, std::chars_format::fixed, decimals);
 }

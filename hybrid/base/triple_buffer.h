@@ -30,7 +30,8 @@ class TripleBuffer {
   }
 
  private:
-  // kFresh: bit of the word: the slot in it was not read yet. kIndex: mask of the number of the slot.
+  // middle_ holds the number of a slot, for which kIndex is the mask. The bit kFresh is set until the slot is
+  // read.
   static constexpr std::uint8_t kFresh = 4, kIndex = 3;
   std::array<T, 3> slots_{};
   std::atomic<std::uint8_t> middle_{1};

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostLinks = 40;  // links in a row at most, as in the system itself
+constexpr int kMostLinks = 40;  // greatest number of links in a row, as in the system itself
 constexpr std::string_view kOpenFiles = "/proc/self/fd/";
 
 [[noreturn]] void refuse_file(const fs::path& file, const std::string& why) {
@@ -53,7 +53,8 @@ std::string unused_name() {
 }
 
 // Temporary names that are, or are about to be, in a folder. A signal handler reads them.
-constexpr std::size_t kMostNames = 16;  // more files at a time are left if a signal ends the process
+constexpr std::size_t kMostNames =
+    16;  // further files at the same time stay behind if a signal ends the process
 std::array<std::atomic<const char*>, kMostNames> names_in_folders{};
 
 void replace_name(const char* from, const char* to) noexcept {
@@ -123,8 +124,8 @@ bool FileOnItsWay::open() noexcept {
   struct stat old {};
   const bool replaces = ::stat(place_.target.c_str(), &old) == 0;
   if (replaces && ::access(place_.target.c_str(), W_OK) != 0) return false;  // the owner protects the file
-  // A file without a name vanishes with the process. keep() gives it a name by way of /proc. Some file
-  // systems (NFS) have no such files; then a temporary name is used.
+  // A file without a name vanishes with the process. keep() gives it a name by way of /proc. A file system
+  // without such files (NFS) gets a temporary name instead.
   if (::access(kOpenFiles.data(), X_OK) == 0)
     descriptor_ = ::open(place_.folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, kMode);
   if (descriptor_ < 0) {
@@ -166,7 +167,7 @@ bool FileOnItsWay::keep() noexcept {
   }
   named_ = false;
   forget_name();
-  // Writes the new name to the disk too. Some file systems cannot do this; the file is there without it.
+  // Writes the new name to the disk too. Where a file system refuses this, the file is in place all the same.
   const int folder = ::open(place_.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder >= 0) {
     ::fsync(folder);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Files that are written whole or not at all. The bytes go to a file without a name in the same folder. When
-// all are on the disk, it replaces the target. So a full disk or a kill leaves the old file as it was.
+// all bytes are on the disk, this file replaces the target. So a full disk or a kill leaves the old file as
+// it was.
 #pragma once
 
 #include <cstddef>
@@ -22,12 +23,12 @@ struct FilePlace {
   std::string target;           // the file after all links
   std::string folder;           // of the target
   std::string temporary;        // an unused name in the folder
-  int descriptor = -1;          // if the path names an open descriptor; otherwise −1
+  int descriptor = -1;          // the open descriptor that the path names; −1: none
   bool at_once = false;         // true: no ordinary file, written directly
 };
 
-// A file that is being written, without allocation: safe in a signal handler. Functions return false on
-// failure and set errno.
+// A file that is being written. It allocates nothing, so it is safe in a signal handler. Functions return
+// false on failure and set errno.
 class FileOnItsWay {
  public:
   explicit FileOnItsWay(const FilePlace& place) noexcept : place_(place) {}

@@ -33,8 +33,8 @@ constexpr std::array<int, 2> kBoxes{1, 5};  // cells along an edge: one cell, or
 
 struct QueryBox {
   glm::dvec3 low, high;
-  // The box that is looked up in the map. For voxels and a box of one cell it is a point in that cell, which
-  // gives the same answer.
+  // The box that is looked up in the map. For voxels and a box of one cell, both corners are one point in
+  // that cell. The answer is the same.
   glm::dvec3 map_low, map_high;
 };
 using Found = std::array<std::uint32_t, kMostFound>;
@@ -254,8 +254,8 @@ void OccupancyBench::look_up(OccupancyPattern pattern, int box_cells,
         // Continues where the last round ended. The first batch of a round is a warm-up.
         const std::size_t first = at[e], count = samples[e].batch;
         at[e] = (first + count) % boxes.size();
-        // The boxes are copied first, because a caller has its box in the cache. Reading a box from a list of
-        // ten megabytes took 3 to 5 ns if another engine had used the caches in between.
+        // The boxes are copied first, because a caller has its box in the cache. A box read from a list of
+        // ten megabytes costs 3 to 5 ns if another engine used the caches in between.
         std::copy_n(boxes.begin() + static_cast<std::ptrdiff_t>(first), count, asked.begin());
         const std::span questions(asked.data(), count);
         std::size_t found = 0;

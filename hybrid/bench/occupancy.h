@@ -31,7 +31,7 @@ struct OccupancyRow {
   // reading of the clock cannot be timed one by one. With batch 1 the times are of single operations.
   double p50_ns = 0.0, p99_ns = 0.0;
   std::size_t batch = 1, batches = 0;
-  double bytes_per_cell = 0.0;  // memory of the search alone, without its positions or triangles
+  double bytes_per_cell = 0.0;  // memory of the search structure, without positions or triangles
   int box_cells = 0;            // look-ups: cells along an edge of the box
   // Answers of this engine compared with those of the reference to the same questions. `missed` must be 0.
   // `extra` counts results that are not in the box but within a cell of it, which the map may report for
@@ -56,8 +56,8 @@ std::vector<OccupancyRow> bench_occupancy(const OccupancyBenchOptions& options);
 nlohmann::ordered_json to_json(const OccupancyRow& row);
 std::string occupancy_table_head();
 std::string occupancy_table_line(const OccupancyRow& row);
-// Compares the map of an object with all voxels and that with only the surface. Also lists the rows in which
-// the map is not better than another engine. Empty: there are no such rows.
+// Compares two maps of each object: with all its voxels, and with only its surface. Then lists the rows in
+// which the map is slower than another engine, and compares the memory of map and tree.
 std::string occupancy_summary(const std::vector<OccupancyRow>& rows);
 
 }  // namespace hybrid::bench

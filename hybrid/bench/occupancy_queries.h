@@ -23,7 +23,7 @@ inline constexpr double kBallCell_m = 1e-3;  // edge of the map's cells, and spa
 struct OccupancyBall {
   OccupancyWhat what = OccupancyWhat::voxels_surface;
   double radius_m = 0.0;  // the middle is the scene's origin
-  // For triangles it is chosen so that there are about as many cells as triangles.
+  // For triangles the size is such that there are about as many cells as triangles.
   double cell_m = kBallCell_m;
   std::vector<glm::dvec3> points;  // voxels: each is in its own cell, up to 0.3 cells off its middle
   polygon::TriangleMesh mesh;

@@ -16,10 +16,10 @@ constexpr double kFirstPolar = 0.3, kLastPolar = kPi - 0.3;  // rad
 constexpr double kSpiral_s = 20.0;                           // duration of the spiral over the sphere
 constexpr double kStep_m = 1e-4;                             // step along polylines: 0.1 m/s
 constexpr int kPressTicks = 200;                             // ticks of a press from its start to its depth
-constexpr double kPressFrom_m = 0.010;                       // start of a press above the sphere
-constexpr int kTapTicks = 20;                                // ticks of the way in, and of the way out
-constexpr double kTapReach_m = 0.02;                         // reach of a tap above and below the surface
-constexpr double kTapTurn = 0.3;                             // tilt of a tap from the normal
+constexpr double kPressFrom_m = 0.010;  // height above the sphere at which a press starts
+constexpr int kTapTicks = 20;           // ticks of the way in, and of the way out
+constexpr double kTapReach_m = 0.02;    // reach of a tap above and below the surface
+constexpr double kTapTurn = 0.3;        // tilt of a tap from the normal
 // Distance from the tool at which even the largest body is clear of it.
 constexpr double kSweep_m = 0.095;
 constexpr double kMiss_m = 0.03;  // greatest distance at which the body's middle passes the tool

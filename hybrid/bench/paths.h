@@ -79,8 +79,8 @@ GoalPath corner_path(double tool_radius_m, bool symmetric, int laps = 10);
 GoalPath cornerfast_path(double tool_radius_m, int ticks = 20000);
 
 // The tool rests and the body moves. Each lap has another direction, and another distance at which the body
-// passes the tool: halfway over the tool, back, and then all the way over it. There is no closed form,
-// because the body decides the proxy's way round it.
+// passes the tool. In each lap the body moves halfway over the tool, back, and then all the way over the
+// tool. There is no closed form, because the shape of the body determines the proxy's way round the body.
 GoalPath moving_path(double speed_m_s, int laps);
 int moving_laps(double speed_m_s);  // about 20,000 ticks in all
 

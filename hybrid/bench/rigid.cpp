@@ -20,19 +20,19 @@ namespace {
 constexpr double kBall_m = 0.002;  // radius of the ball tool
 constexpr double kPoint_m = 0.0;   // radius of the point tool
 constexpr std::size_t kMostReferenceTriangles =
-    3'000'000;                             // of the exact reference, which takes 1 kB a triangle
-constexpr std::size_t kLarge = 3'000'000;  // triangles: a shorter table
-constexpr double kSlowest_m_s = 0.02;      // of a scene of size 1: a lap of `moving` takes 19 s then
+    3'000'000;  // a larger mesh has no exact reference, which takes 1 kB a triangle
+constexpr std::size_t kLarge = 3'000'000;  // triangles; from here on the paths are shorter
+constexpr double kSlowest_m_s = 0.02;      // in a scene of size 1; a lap of `moving` then takes 19 s
 
-// Seconds a baseline may spend in steps of one pass, and what judging one run may take.
+// Limits of time: for the steps of a baseline in one pass, and for judging one run.
 struct Budget {
   double cgal_s, no_map_s, other_s, judge_s, judge_baseline_s;
 };
 constexpr Budget kFull{0.7, 0.7, 8.0, 1.0, 0.2};  // s, in the order of Budget's members
 constexpr Budget kQuick{0.05, 0.1, 1.0, 0.05, 0.02};
 
-// Paths are made in a scene of size 1, and scaled. A mesh of a file keeps its size: the scale fits the paths
-// to it, and tool and speed are what they are in the scene.
+// Paths are made in a scene of size 1 and then scaled. A named mesh is scaled too. A mesh from a file keeps
+// its size, and the paths are scaled to that size.
 struct Case {
   std::string path, mesh;
   double radius_m = 0.0, speed_m_s = 0.0;  // in a scene of size 1
@@ -45,7 +45,7 @@ struct Case {
   [[nodiscard]] double scene_scale() const { return file ? 1.0 : scale; }
 };
 
-// ---- which runs ----
+// ---- choice of the runs ----
 
 bool wanted(const std::vector<std::string>& list, const std::string& name) {
   return list.empty() || std::find(list.begin(), list.end(), name) != list.end();
@@ -103,7 +103,7 @@ class Plan {
       if (options_.on_note) options_.on_note(note);
     }
     const double scale = mesh->reach_m / kSphereRadius_m;
-    // The same ball as elsewhere, unless the mesh is too small for it.
+    // For a large mesh the ball is 2 mm as elsewhere; for a small mesh it shrinks with the scale.
     const double ball = kBall_m / std::max(1.0, scale);
     const auto add_path = [&](const char* path, const std::vector<double>& speeds) {
       if (!wanted(options_.paths, path)) return;
@@ -116,7 +116,7 @@ class Plan {
     using Speeds = std::vector<double>;
     add_path("far", {0.1});
     add_path("slide", options_.quick ? Speeds{0.1} : Speeds{0.1, 1.0});
-    add_path("tap", {2.0 * scale});  // a path of 41 ticks, whatever the size
+    add_path("tap", {2.0 * scale});  // each tap takes 41 ticks for any size of the mesh
     add_path("moving", options_.quick ? Speeds{0.1} : Speeds{0.02, 0.1, 1.0});
   }
 
@@ -135,7 +135,7 @@ class Plan {
     add("tap", mesh, {2.0});
   }
 
-  // The same in scenes of another size, and far from the origin.
+  // Adds runs in scenes of another size, and far from the origin.
   void add_elsewhere(const std::string& mesh) {
     struct Place {
       double scale, offset_m;
@@ -153,8 +153,8 @@ class Plan {
   std::vector<Case> cases_;
 };
 
-// Where the surface of a mesh of a file lies first on the way from outside to the origin, in a scene of size
-// 1: the way goes on by the distance to the surface, until that is a billionth.
+// Distance from the origin to the first surface that a ray from outside to the origin meets, in a scene of
+// size 1. Each step along the ray is as long as the distance to the surface (sphere tracing).
 std::optional<double> first_surface(const polygon::RigidSurface& surface, const glm::dvec3& direction,
                                     double scale) {
   constexpr double kMet = 1e-9;    // distance at which the ray has met the surface (unit: `scale`)
@@ -191,7 +191,7 @@ std::string tool_text(double radius_m) {
   return radius_m > 0.0 ? fmt::format("{:g} mm ball", 1e3 * radius_m) : "point";
 }
 
-// ---- one mesh, and everything that is built of it once ----
+// ---- one mesh, and the structures that its runs share ----
 
 class Workshop {
  public:
@@ -314,7 +314,7 @@ class Workshop {
 
   void save(const Case& c, const GoalPath& path, const TouchRun& run) const {
     const double own =
-        c.scale / c.scene_scale();  // the name's figures are of a scene of size 1, or of the file
+        c.scale / c.scene_scale();  // a name has the figures of a scene of size 1, or of the file's scene
     std::string name =
         fmt::format("{}-{}-{}-{:g}mps-{}", c.path, std::filesystem::path(c.mesh).filename().string(),
                     c.radius_m > 0.0 ? fmt::format("{:g}mm", 1e3 * own * c.radius_m) : "point",
@@ -363,7 +363,7 @@ std::vector<RigidRow> bench_rigid(const RigidBenchOptions& options) {
         "tap "
         "and moving for files");
   }
-  // What shares a mesh comes together; else in the order of the plan.
+  // Cases with the same mesh follow one another. Otherwise the order of the plan stays.
   std::stable_sort(cases.begin(), cases.end(), [](const Case& a, const Case& b) {
     const auto key = [](const Case& c) {
       return std::tuple(c.scene_scale() != 1.0, c.triangles, c.mesh, c.scale);
@@ -381,7 +381,7 @@ std::vector<RigidRow> bench_rigid(const RigidBenchOptions& options) {
                                    tool_text(c.tool_m() / c.scene_scale()), c.speed() / c.scene_scale()));
     }
     if (!workshop || !workshop->serves(c)) {
-      workshop.reset();  // before the next is built: both need not fit
+      workshop.reset();  // first, because two meshes at once may not fit into memory
       workshop = std::make_unique<Workshop>(options, c);
     }
     for (RigidRow& row : workshop->run(c, timer)) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `hybrid bench rigid`: the proxy along the paths of paths.h, over meshes of all sizes, beside
-// baselines, each time with its error.
+// `hybrid bench rigid`: the proxy and its baselines along the paths of paths.h, over meshes of all sizes.
+// Each time is stated with its error.
 #pragma once
 
 #include <filesystem>
@@ -18,16 +18,16 @@ const std::vector<std::string>& rigid_paths();
 
 struct RigidBenchOptions {
   bool quick = false;              // a short piece of each path, small meshes, one speed
-  bool every_tick = false;         // the exact reference at every tick, however long that takes
+  bool every_tick = false;         // compares every tick with the exact reference, without a limit of time
   std::vector<std::string> paths;  // empty: all
-  // Empty: those of the default table; else exactly these, by name or by file, see meshes.h.
+  // Names or files (meshes.h). Empty: the meshes of the default table.
   std::vector<std::string> meshes;
-  double mesh_unit_m = 1e-3;    // of files
-  std::vector<Engine> engines;  // empty: all, above kMostBaselineTriangles only hybrid and no_map
+  double mesh_unit_m = 1e-3;    // length unit of mesh files
+  std::vector<Engine> engines;  // empty: all; for meshes above kMostBaselineTriangles only hybrid and no_map
   std::filesystem::path trace;  // folder for one CSV a run; empty: none
   Progress progress;
   std::function<void(const std::string&)> on_note;  // defects of a file's mesh
-  std::function<void(const RigidRow&)> on_row;      // as soon as there is one
+  std::function<void(const RigidRow&)> on_row;      // called for each row as soon as it is measured
 };
 
 // Larger meshes are measured without CGAL's baselines, because CGAL's tree takes too long for them.

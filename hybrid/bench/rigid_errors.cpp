@@ -11,11 +11,12 @@
 namespace hybrid::bench {
 namespace {
 
-// All of the paths' own scale (unit: meter, times the run's scale).
-constexpr double kDeep_m = 1e-5;    // below the inscribed sphere, or a file's mesh, by this much is inside
-constexpr double kLeak_m = 1e-6;    // past a cube's face or a corner's plane by this much is inside
-constexpr double kSearch_m = 1e-3;  // around the proxy for its first-order optimum
-constexpr std::size_t kProbe = 16;  // ticks that are always judged, and tell what one costs
+// Lengths in a scene of size 1 (m); they are multiplied by the run's scale.
+constexpr double kDeep_m =
+    1e-5;  // a deeper proxy is inside: below the inscribed sphere, or below a file's mesh
+constexpr double kLeak_m = 1e-6;    // a deeper proxy is inside: past a cube's face or a corner's plane
+constexpr double kSearch_m = 1e-3;  // radius of the search for the first-order optimum around the proxy
+constexpr std::size_t kProbe = 16;  // ticks that are always judged; their time gives the cost of one
 // distance from the corner within which a leak is looked for (unit: the scene's scale)
 constexpr double kCornerSeen_m = 0.1;
 
@@ -43,8 +44,8 @@ double percentile(std::vector<double>& values, double share) {
   return values[static_cast<std::size_t>(at)];
 }
 
-// `count` of the candidates, evenly; a stride that shares no factor with a tap's 41 ticks sees all of its
-// phases.
+// About `count` of the candidates at a constant stride. The stride shares no factor with the 41 ticks of a
+// tap, so that all phases of a tap occur.
 std::vector<std::size_t> thinned(const std::vector<std::size_t>& candidates, std::size_t count) {
   std::size_t stride =
       std::max<std::size_t>(1, (candidates.size() + count - 1) / std::max<std::size_t>(1, count));
@@ -54,7 +55,7 @@ std::vector<std::size_t> thinned(const std::vector<std::size_t>& candidates, std
   return kept;
 }
 
-// How many of `all` a budget pays for, when the first `done` took `spent_s`.
+// Number of the `all` ticks that fit into the budget, if `done` ticks took `spent_s`. At least kProbe.
 std::size_t affordable(std::size_t all, std::size_t done, double spent_s, double budget_s) {
   if (budget_s < 0.0 || done == 0) return all;
   const double each = std::max(1e-9, spent_s / static_cast<double>(done));
@@ -93,7 +94,7 @@ bool Judge::inside(const glm::dvec3& p) const {
   return std::min({p.x, p.y, p.z}) < -kLeak_m * scale_ && std::max({p.x, p.y, p.z}) < kCornerSeen_m * scale_;
 }
 
-// Exact references are for ticks in which something holds the proxy; where nothing ever does, for all.
+// Candidates are the ticks in which an object holds the proxy. If there are none, all counted ticks are.
 std::vector<std::size_t> Judge::ticks_to_judge(const TouchRun& run, double budget_s) {
   std::vector<std::size_t> held, all;
   for (std::size_t k = path_.counted_from; k < run.ticks; ++k) {
@@ -119,7 +120,7 @@ void Judge::judge_exactly(const TouchRun& run, double budget_s, Judgement& out) 
                                                      radius_m_, kSearch_m * scale_);
     ++out.error_ticks;
     if (!optimum.found) ++out.lost_ticks;
-    // Nothing found says that the error is no less than what was searched.
+    // If no optimum was found, the error is at least the radius of the search.
     errors.push_back(optimum.found ? optimum.error_m : kSearch_m * scale_);
     if (!(errors.back() <= out.error_mesh_max.value_or(0.0))) out.error_worst_tick = k;
     out.error_mesh_max = std::max(out.error_mesh_max.value_or(0.0), errors.back());
@@ -208,7 +209,7 @@ Judgement Judge::judge(const TouchRun& run, double budget_s) {
   judge_closed(run, out);
   judge_optimum(run, budget_s, out);
   judge_exactly(run, budget_s, out);
-  // Without an exact reference the closed one, which is exact on a cube and a corner.
+  // Without an exact reference the closed form stands in. It is exact on a cube and a corner.
   if (!out.error_mesh_max && out.error_closed_max) out.error_mesh_max = out.error_closed_max;
   return out;
 }

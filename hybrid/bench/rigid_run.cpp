@@ -19,8 +19,8 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr std::size_t kBlock = 2000;        // ticks an engine has the processor's caches for itself
-constexpr std::uint32_t kMostPasses = 100;  // of the published proxy in a tick, where it is to stand
+constexpr std::size_t kBlock = 2000;        // ticks for which one engine has the processor's caches to itself
+constexpr std::uint32_t kMostPasses = 100;  // of the published proxy in a tick of `finger_settled`
 
 double ms_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -61,7 +61,7 @@ void prepare(TouchRun& run, const GoalPath& path) {
   if (!path.body_m.empty()) run.pose_us.resize(path.goals.size());
 }
 
-// Ticks first … last − 1 of the path, or fewer when the time is up.
+// Runs ticks first … last − 1 of the path, or fewer if the time limit is reached.
 void run_block(const GoalPath& path, std::size_t first, std::size_t last, TouchWorld& touch, double limit_s,
                const glm::dvec3& rest_m, const TickTimer& timer, TouchRun& run) {
   auto start = std::lower_bound(path.starts.begin(), path.starts.end(), first);
@@ -213,7 +213,7 @@ bool TouchWorld::would_go_on(const glm::dvec3& proxy_m, const glm::dvec3& goal_m
 
 namespace {
 
-// One pass: all engines once along the path, engine e at most `most[e]` ticks.
+// Runs all engines once along the path. Engine e runs at most `most[e]` ticks.
 std::vector<TouchRun> run_pass(const GoalPath& path, std::span<const std::size_t> most,
                                std::span<TouchWorld* const> worlds, std::span<const double> limit_s,
                                const glm::dvec3& offset_m, const TickTimer& timer) {
@@ -234,7 +234,7 @@ float touch_us(const TouchRun& run, std::size_t tick) {
   return run.tick_us[tick] + (run.pose_us.empty() ? 0.0F : run.pose_us[tick]);
 }
 
-// The published proxy says nothing of the places where it would go on, so a further pass is tried from each.
+// The published proxy does not report whether it has come to rest, so a further pass is tried in each tick.
 void count_unsettled(const GoalPath& path, const TouchWorld& world, const glm::dvec3& offset_m,
                      TouchRun& run) {
   for (std::size_t k = path.counted_from; k < run.ticks; ++k) {

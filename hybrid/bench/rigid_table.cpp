@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// What is no number in JSON (and what has no meaning) is null.
+// JSON has no infinity and no NaN, so these become null. A figure without a meaning is null too.
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
@@ -31,7 +31,7 @@ std::string count_text(const std::optional<std::size_t>& value) {
   return value ? std::to_string(*value) : std::string("-");
 }
 
-// The file alone of a path.
+// The name of the mesh's file without its folder.
 std::string mesh_text(const RigidRow& row) {
   return std::filesystem::path(row.mesh).filename().string();
 }
@@ -61,7 +61,7 @@ bool same_work(const RigidRow& a, const RigidRow& b) {
          a.scale == b.scale && a.offset_m == b.offset_m;
 }
 
-// Cells that both tables have.
+// Cells of both tables.
 std::string ball_text(const RigidRow& row) {
   return row.radius_m > 0.0 ? fmt::format("{:g}", 1e3 * row.radius_m) : "point";
 }
@@ -197,7 +197,7 @@ class Ratios {
     if (other == rows_.end() || !(own.least_us.*which_ > 0.0)) return std::nullopt;
     return Ratio{other->least_us.*which_ / (own.least_us.*which_), other->ticks >= own.ticks};
   }
-  // The geometric mean over the rows of the product, without partial ones unless there are no others.
+  // The geometric mean over the rows of the product. Partial ratios count only if there are no others.
   [[nodiscard]] std::optional<Ratio> mean() const {
     const std::optional<Ratio> whole = mean_of(true);
     return whole ? whole : mean_of(false);

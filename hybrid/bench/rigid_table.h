@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rows of `hybrid bench rigid`: as JSON, as a table to read, and engine beside engine.
+// The rows of `hybrid bench rigid`: as JSON, as a table, and as a table of ratios between engines.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -17,11 +17,11 @@ struct RigidRow {
   double radius_m = 0.0, speed_m_s = 0.0, scale = 1.0;
   glm::dvec3 offset_m{0.0};
   Engine engine = Engine::hybrid;
-  std::size_t ticks = 0, path_ticks = 0;  // measured, and of the whole path
+  std::size_t ticks = 0, path_ticks = 0;  // ticks that were measured; ticks of the whole path
   Percentiles tick_us;
-  // Of each tick's least time in kPasses passes, with that of moving the body (TouchRun::least_us).
+  // Percentiles of TouchRun::least_us.
   Percentiles least_us;
-  std::optional<Percentiles> pose_us;  // moving the body
+  std::optional<Percentiles> pose_us;  // time of moving the body
   double timer_overhead_us = 0.0;
   double steps_mean = 0.0, surveys_per_tick = 0.0;
   std::uint32_t steps_max = 0;
@@ -36,10 +36,9 @@ nlohmann::ordered_json to_json(const RigidRow& row);
 
 std::string table_head();
 std::string table_line(const RigidRow& row);
-// The same path and mesh through each engine: p50 and p99 of the product's least times, and how many times as
-// long the others take, with the geometric means of these ratios. Where the body moves, moving it counts. A
-// star marks an engine that was stopped before the end of the path: its ticks are others, and the mean leaves
-// it out.
+// A row for each path and mesh: p50 and p99 of the product's least times, and the ratios of the other
+// engines' times to them. The last row has the geometric means of the ratios. Times include moving the body.
+// A star marks an engine that was stopped before the end of the path; the mean leaves it out.
 std::string ratio_table(const std::vector<RigidRow>& rows);
 
 }  // namespace hybrid::bench

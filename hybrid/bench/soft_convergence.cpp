@@ -12,8 +12,9 @@
 namespace hybrid::bench {
 namespace {
 
-constexpr float kPush = 0.5e-3F;  // m; less than the slack, so that there is relaxation but no chain
-constexpr double kRemedy = 0.2;   // factor on the thesis's movement: "some small value"
+constexpr float kPush =
+    0.5e-3F;  // m; less than the slack, so that the push relaxes but starts no wave of the chain
+constexpr double kRemedy = 0.2;  // factor on the thesis's movement: "some small value"
 
 // An object of which one voxel is pushed.
 struct Object {

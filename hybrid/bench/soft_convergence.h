@@ -9,7 +9,8 @@ namespace hybrid::bench {
 
 struct SettlingCurve {
   std::string name;
-  std::vector<double> displacement;  // [round, from 0]; of the pushed voxel from rest, as a share of the push
+  std::vector<double>
+      displacement;  // [round, from 0]; distance of the pushed voxel from rest, as a share of the push
 };
 struct SettlingObject {
   std::string name;

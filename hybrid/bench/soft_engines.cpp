@@ -162,7 +162,7 @@ class Inspection {
   void look_at_plane(int k, const Push& whole) {
     engine_.read_plane(k, plane_);
     for (std::size_t n = 0; n < size_; ++n) {
-      owed_[n] = 0;  // one bit for each axis on which the voxel moved and no link has explained it
+      owed_[n] = 0;  // one bit for each axis on which the voxel moved, until a link is found that moved it
       for (int axis = 0; axis < 3; ++axis)
         if (std::fabs(static_cast<double>(plane_[n][axis])) > rounding_)
           owed_[n] = static_cast<std::uint8_t>(owed_[n] | 1U << static_cast<unsigned>(axis));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The engines that spread a wave, behind one interface, so that all get the same inputs in the same run. Also
-// these inputs, and an inspection of the result that shares no code with any engine.
+// The engines that spread a wave, behind one interface, so that all get the same inputs in the same run. The
+// header also has these inputs, and an inspection of the result that shares no code with any engine.
 #pragma once
 
 #include <array>
@@ -51,8 +51,8 @@ std::unique_ptr<WaveEngine> make_wave_engine(SoftEngine engine);
 //   source_off_m  greatest distance of a source from its target (m)
 // Differences count only above a tolerance for rounding. It is the number of links on the longest way from a
 // source, times the spacing of floats at the largest displacement. If the last three figures are zero, the
-// state is exactly that of the definition: a shortest chain of links at their limits leads from each voxel to
-// a source.
+// state is exactly that of the definition. Then a shortest chain of links at their limits leads from each
+// moved voxel to a source.
 struct WaveState {
   std::size_t moved = 0, violated = 0, unsupported = 0;
   double source_off_m = 0.0;

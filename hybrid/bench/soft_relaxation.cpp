@@ -124,7 +124,7 @@ class Pressed {
  private:
   std::unique_ptr<voxel::SoftObject> object_;
   std::unique_ptr<voxel::ShadowObject>
-      replica_;  // made before the press, as in a session, so that the press is new to it
+      replica_;  // made before the press, as in a session, so that it has to follow the press
   voxel::ToolInBody tool_;
   std::vector<voxel::VoxelId> near_;
 };

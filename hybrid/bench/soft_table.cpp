@@ -156,7 +156,7 @@ std::string soft_table_line(const SoftRow& row) {
 }
 
 std::optional<Growth> growth_of(const std::vector<SoftRow>& rows) {
-  std::set<std::pair<double, std::size_t>> points;  // one for each ratio and count, whichever engine found it
+  std::set<std::pair<double, std::size_t>> points;  // one for each ratio and count, from any engine
   for (const SoftRow& row : rows) {
     if (in_study(row)) points.insert({*row.depth_spacings / *row.slack, *row.moved});
   }

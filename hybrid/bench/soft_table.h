@@ -27,7 +27,7 @@ struct SoftRow {            // empty members: the row has no such figure
   int threads = 1;
   std::optional<std::size_t> moved{};     // voxels away from rest, by an independent inspection
   std::optional<std::size_t> violated{};  // links beyond their limits, by an independent inspection
-  std::optional<Percentiles> time_us{};   // of waves or ticks, or of what the note names
+  std::optional<Percentiles> time_us{};   // of waves or ticks, or of the work that the note names
   // The p50 of classic over this engine's, with the same inputs in the same run.
   std::optional<double> speedup{};
   std::optional<double> ns_per_voxel_update{};

@@ -85,9 +85,8 @@ void add_with_speedup(std::vector<SoftRow> rows, const AddRow& add) {
 }
 
 // Runs each engine from rest, in turns, so that other load of the machine affects all alike. The first run of
-// a turn does not count: the caches still hold the data of the other engine, and nobody uses two engines at
-// once. (With a turn of one run, the cache lines of classic were written back to memory during our runs. That
-// was half of the time of a wave ten spacings deep.)
+// a turn does not count, because the caches still hold the data of the other engine. Writing these cache
+// lines back to memory takes half of the time of a wave ten spacings deep.
 void run_wave(const Wave& wave, std::vector<TimedEngine>& engines, const voxel::LabelVolume& volume,
               const voxel::LatticeOptions& options, double most_us, const AddRow& add) {
   double spent_us = 0.0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `hybrid bench threads`: cost of the servo thread's ticks while relaxation and snapshots use the other
-// cores. The same ticks are also timed while the other cores run unrelated work that only moves memory. Their
-// results are equal to the last bit.
+// cores. The same ticks are also timed while the other cores run unrelated work that only moves memory. The
+// results of both are equal to the last bit.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,7 @@ struct ThreadsRow {
 //                    surfaces.
 //   memory           the session under `relaxation` is played again with its inputs, while a thread copies
 //                    256 MB between two buffers. Each tick gets the same asynchronous results as under
-//                    `relaxation`. The copying thread writes them, so another core wrote them here, too.
+//                    `relaxation`. The copying thread writes them, so here too they come from another core.
 //   nothing relaxed  as `memory`, but no result ever arrives: the cost of ticks that have less to do.
 // Throws SceneError.
 std::vector<ThreadsRow> bench_threads(const ThreadsBenchOptions& options);

@@ -22,8 +22,8 @@ namespace hybrid {
 namespace {
 
 constexpr int kBallSubdivisions = 4;  // 5,120 triangles for drawing and the map; contact is exact
-// Bytes per voxel after it was touched, measured with 160³ voxels: 61 with one label, 96 with four labels in
-// layers, 179 with labels mixed voxel by voxel, 228 with plasticity; 24 more with bricks.
+// Bytes per touched voxel. Measured with 160³ voxels: 61 with one label, 96 with four labels in layers, 179
+// with labels mixed voxel by voxel, 228 with plasticity. Bricks take 24 more.
 constexpr double kTouchedBytes = 60.0, kTouchedMixedBytes = 180.0, kYieldBytes = 50.0, kBrickBytes = 25.0;
 
 std::string in_words(const polygon::Finding& f) {
@@ -78,7 +78,7 @@ voxel::VolumeFileOptions volume_options(const std::vector<voxel::LabelRule>& rul
   return {.unit_m = unit_m, .rules = rules, .spacing_m = spacing, .max_bytes = usable_memory_bytes() / 4};
 }
 
-// Adds notes for the user: the repairs by the file's reader.
+// Adds a note for the user on each repair by the file's reader.
 void add_notes(const std::string& object, const std::filesystem::path& file,
                const std::vector<std::string>& of_file, std::vector<BuildNote>& notes) {
   for (const std::string& note : of_file)

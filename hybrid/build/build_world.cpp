@@ -171,9 +171,8 @@ class Builder {
     return why;
   }
 
-  // Objects that can meet nothing but the tool and standing rigid objects get contacts on nested patches.
-  // Obstacles are found for objects that have rigid objects near, and for all objects that are kept voxel by
-  // voxel.
+  // Objects that can meet only the tool and standing rigid objects get contacts on nested patches. Obstacles
+  // are found for objects that have rigid objects near, and for all objects that are kept voxel by voxel.
   void use_patches_and_obstacles() {
     const std::vector<Box> boxes = boxes_at_rest();
     for (std::size_t o = 0; o < world_->soft.size(); ++o) {

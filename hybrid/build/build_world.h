@@ -50,8 +50,8 @@ struct ObjectBox {
 ObjectBox object_box(const World& world, std::size_t object);
 std::string in_words(const ObjectBox& box);
 
-// Upper bound on the memory (bytes) of a soft object with these dimensions before it is touched: its file's
-// contents, its lattice (at most 2.5 bytes a voxel), its surface and its part of the map.
+// Upper bound on the memory (bytes) of a soft object with these dimensions before it is touched. The bound
+// covers its file's contents, its lattice (at most 2.5 bytes a voxel), its surface and its part of the map.
 std::uint64_t soft_load_bytes(const std::array<int, 3>& dims);
 // Memory (bytes) of a soft object after all of it has moved: state, coarse levels, and link stiffness if
 // there are several labels. A session needs it only for tissue that the tool or relaxation reached.

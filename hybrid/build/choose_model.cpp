@@ -15,7 +15,7 @@ namespace {
 // From about this stiffness on, a hand perceives a surface as rigid: 153 to 415 N/cm in Tan, Srinivasan,
 // Eberman & Cheng, "Human factors for the design of force-reflecting haptic interfaces" (1994).
 constexpr double kRigidToAHand_N_per_m = 25e3;
-// Force limit assumed for a device without one: that of the largest device known here.
+// Force limit that is assumed for a device without a limit. It is that of the largest known device.
 constexpr double kStrongForce_N = 37.5;
 
 struct Stiffness {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides which soft objects need voxels. If the coupling or the device is so soft that a hand could not tell
-// tissue from a rigid surface, a proxy on the surface feels the same at a thousandth of the cost.
+// Decides which soft objects need voxels. A proxy on the surface takes a thousandth of the time. If coupling
+// or device are so soft that a hand could not tell tissue from a rigid surface, the proxy is enough.
 #pragma once
 
 #include "hybrid/scene/scene.h"

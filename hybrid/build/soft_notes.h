@@ -36,8 +36,8 @@ void note_missing_labels(const SoftDescription& description, const voxel::LabelV
 void note_missing_anchors(const SoftDescription& description, std::span<const std::size_t> near_rigid,
                           std::vector<BuildNote>& notes);
 
-// Notes whether the object's contacts are kept on nested patches. `why_not`: why they are not; empty if they
-// are.
+// Notes whether the object's contacts are kept on nested patches. `why_not`: the reason if they are not,
+// otherwise empty.
 void note_patches(const SoftDescription& description, const voxel::SoftObject& object,
                   const std::string& why_not, std::vector<BuildNote>& notes);
 

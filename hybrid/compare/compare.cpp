@@ -30,8 +30,8 @@ Scene bare(const Scene& scene) {
   return one;
 }
 
-// The rigid object as a soft object of the same shape and of material "hard". Empty if the object has no
-// voxels. That holds for a sheet, for a body thinner than two voxels, and for a mesh, which may be open.
+// The rigid object as a soft object of the same shape and of material "hard". Empty for a sheet, for a body
+// thinner than two voxels, and for a mesh, which may be open.
 std::optional<SoftDescription> as_soft(const RigidDescription& rigid) {
   SoftDescription soft{.name = rigid.name,
                        .source = {},
@@ -75,7 +75,7 @@ std::vector<Pose> poses_along(const RigidDescription& rigid, const Scene& scene,
   if (!std::holds_alternative<PathMotion>(rigid.motion)) return poses;
   const RigidMotion motion(rigid, rigid.pose, {}, false);
   double t_s = 0.0;
-  // Summed as the tick sums its time.
+  // The times are summed as in the tick.
   for (Pose& pose : poses) pose = motion.pose_at(t_s += 1.0 / scene.rate_hz);
   return poses;
 }
@@ -200,7 +200,7 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
     throw std::runtime_error(
         fmt::format("{}: no object \"{}\"; it has{}", scene.file.string(), object, names));
   }
-  // If the user named no object, the first soft one is taken: there the models differ.
+  // If the user named no object, the first soft one is taken, because its models differ.
   const bool is_soft = soft != scene.soft.end();
   Comparison result{.object = is_soft ? soft->name : rigid->name, .models = {}, .reference_text = {}};
   result.jnd_floor_N = jnd_floor_N(scene);

@@ -34,7 +34,7 @@ class TickDifferences {
 };
 
 struct ComparedScene {
-  std::string name;  // from the file's name; unlike the names of the other scenes
+  std::string name;  // from the file's name; differs from the names of the other scenes
   std::vector<TraceRow> rows;
   double peak_N = 0.0;
   ScenesDifference all, moving, still;      // moving: the device is faster than kStill_m_per_s

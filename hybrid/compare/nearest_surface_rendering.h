@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rigid surfaces without a proxy, as they were rendered before proxies (thesis, Fig 18): the force points to
+// Rigid surfaces without a proxy, as they were rendered before proxies (thesis, Fig 18). The force points to
 // the surface that is nearest to the device now. For comparison only. The model forgets from which side the
 // tool came.
 #pragma once

@@ -196,7 +196,7 @@ void add_items(const NameJson& table, NameTable& names, const std::string& where
 
 // Parses, and refuses an object that has a key twice. Most readers of JSON keep only one of the two values.
 NameJson parse_json(const std::string& text, const std::string& file) {
-  std::vector<std::set<std::string>> keys;  // of the objects that are open
+  std::vector<std::set<std::string>> keys;  // keys of each object that is not closed yet
   return NameJson::parse(text, [&](int, NameJson::parse_event_t event, NameJson& value) {
     if (event == NameJson::parse_event_t::object_start) keys.emplace_back();
     if (event == NameJson::parse_event_t::object_end) keys.pop_back();
@@ -219,7 +219,7 @@ LabelNames from_json(const std::filesystem::path& file, const std::string& text)
   } catch (const NameJson::parse_error& error) {
     throw ComposeError(fmt::format("{}:{}: is no JSON; {}", file.string(),
                                    line_at(text, error.byte > 0 ? error.byte - 1 : 0), remedy));
-  } catch (const NameJson::exception&) {  // a number beyond all that can be stored, without its place
+  } catch (const NameJson::exception&) {  // a number too large to be stored; the parser gives no place
     throw ComposeError(fmt::format("{}: holds a number that is too large; {}", file.string(), remedy));
   }
   const NameJson* table = &json;

@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr std::size_t kMostListed = 40;  // most names that an error message lists
+constexpr std::size_t kMostListed = 40;  // greatest number of names in an error message
 
 std::optional<int> whole_number(std::string_view text) {
   int number = 0;

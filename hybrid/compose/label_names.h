@@ -20,9 +20,9 @@ class ComposeError : public std::runtime_error {
 using LabelNames = std::map<int, std::string>;  // key: label, 1..255
 
 // Reads names from a UTF-8 file. ".json": names by number or numbers by name (dataset.json of nnU-Net), or a
-// list of names; under "labels" or at the top. Any other extension: a table (label_rows.h). Labels above 255
-// are skipped, because no volume can have them. Throws ComposeError for text that cannot be read, with its
-// line, and for a table without a name.
+// list of names. These are under "labels" or at the top. Any other extension: a table (label_rows.h). Labels
+// above 255 are skipped, because no volume can have them. Throws ComposeError for text that cannot be read,
+// with its line, and for a table without a name.
 LabelNames read_label_names(const std::filesystem::path& file);
 
 // The labels that `words` select by number, by name, or by a pattern with '*' and '?'. `names` has a name for

@@ -15,7 +15,7 @@
 namespace hybrid {
 namespace {
 
-constexpr char kBlanks = ' ';  // as a separator it stands for any number of spaces and tabs
+constexpr char kBlanks = ' ';                       // as a separator: any number of spaces and tabs
 constexpr std::string_view kSeparators = ",;\t:=";  // other than blanks; the last two after a number alone
 constexpr std::size_t kLeastColour = 3;             // red, green, blue
 constexpr std::size_t kMostColour = 4;              // and opacity
@@ -82,7 +82,7 @@ RowField take_field(std::string_view& row, char separator) {
 
 std::vector<RowField> fields_of(std::string_view row, char separator) {
   std::vector<RowField> fields;
-  // The last field is empty.
+  // A separator at the end of the row is followed by an empty field.
   const bool open = !row.empty() && row.back() == separator && separator != kBlanks;
   while (!row.empty()) fields.push_back(take_field(row, separator));
   if (open) fields.emplace_back();

@@ -40,8 +40,8 @@ struct View {
   double weight = 1.0;
   const char* words = "";
 };
-// Views of a body, with a weight for each. It lies on its back, so the front comes first. The ends of a scan
-// come last: there the body was cut off.
+// Views of a body, with a weight for each. The body lies on its back, so its front comes first. The ends of a
+// scan come last, because the body is cut off there.
 constexpr std::array<View, 6> kBodyViews{{{1, -1.0, 1.0, "from the front"},
                                           {0, 1.0, 0.95, "from its left"},
                                           {0, -1.0, 0.95, "from its right"},
@@ -296,8 +296,8 @@ struct Chosen {
   HeightMap::Spot spot;
 };
 
-// The way over the surface from one place of contact to another, without its ends. Where the surface is steep
-// or missing, the tool is lifted over it by `lift_m`.
+// The path over the surface between two places of contact, without these two places. Where the surface is
+// steep or missing, the tool is lifted over it by `lift_m`.
 std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, const glm::dvec3& to,
                                double radius_m, double lift_m) {
   const double way = map.across(from, to);
@@ -317,7 +317,7 @@ std::vector<glm::dvec3> stroke(const HeightMap& map, const glm::dvec3& from, con
   return points;
 }
 
-// The best place of each target, from whichever view it is best reached. Score 0: no view reaches it.
+// The best place of each target over all views. Score 0: no view reaches the target.
 std::vector<Chosen> best_places(const Surfaces& all, const std::vector<HeightMap>& maps) {
   std::vector<Chosen> best(all.targets.size());
   for (std::size_t view = 0; view < maps.size(); ++view) {

@@ -23,7 +23,8 @@ struct Press {
 // Something that the path does not press.
 struct NotPressed {
   std::string what;
-  bool hidden = false;  // others lie in front of it on every side; false: others are easier to reach
+  bool hidden = false;  // true: other objects lie in front of it on every side; false: other objects are
+                        // easier to reach
 };
 struct PressPath {
   std::vector<PathPoint> points{};
@@ -37,12 +38,12 @@ struct PressPath {
   return hidden ? "because others lie in front on every side" : "because others are easier to reach";
 }
 
-// Plans a path of presses. Along each axis, in both directions, a height map that is dilated by the tool
-// gives the first contact of a ball that comes along the axis. Each kind of bone, mesh and tissue is pressed
-// once, from the direction that most of it faces; those that others hide from all six directions are not
-// pressed, and at most eight rigid and eight soft ones are. Between two presses the tool strokes over the
-// surface. From one view to the next it moves round the scene's box. `built` has the objects of `parts`, in
-// order.
+// Plans a path of presses. There is a height map for each axis and direction, dilated by the tool. It gives
+// the first contact of a ball that comes along the axis. Each kind of bone, mesh and tissue is pressed once,
+// from the direction that most of its surface faces. A target that others hide from all six directions is not
+// pressed. At most eight rigid and eight soft targets are pressed. Between two presses the tool strokes over
+// the surface. From one view to the next it moves round the scene's box. `built` has the objects of `parts`,
+// in order.
 PressPath plan_presses(const BuiltScene& built, const SceneParts& parts, double tool_radius_m);
 
 }  // namespace hybrid

@@ -32,8 +32,8 @@ class ComposeFolder {
   void drop(const std::string& name);
   // Copies an input file. If the input is the target file itself, it stays as it is.
   void copy(const std::filesystem::path& from, const std::string& name);
-  // A name for a file or object by name_letters() that was not given out before, not even in other case:
-  // some file systems ignore case.
+  // A name for a file or object, made by name_letters(). It differs from all names given out before by more
+  // than case, because some file systems ignore case.
   std::string unused_name(const std::string& wanted);
   // Puts all files in place. Throws ComposeError.
   void keep();
@@ -49,8 +49,8 @@ class ComposeFolder {
   std::set<std::string> names_;  // in small letters
 };
 
-// The text with '_' for each character that is neither a letter or digit of ASCII, nor '-', nor a printable
-// character beyond ASCII; cut to 48 bytes.
+// The text with its letters and digits of ASCII, '-' and printable characters beyond ASCII, and with '_' for
+// all others. Cut to 48 bytes.
 std::string name_letters(std::string_view text);
 
 }  // namespace hybrid

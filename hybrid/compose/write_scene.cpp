@@ -17,8 +17,8 @@ namespace {
 constexpr double kToolShare = 0.02;  // radius of the tool, as a share of the longest object
 constexpr double kCoupling = 800.0;  // N/m; does not buzz in any grip, see `hybrid stability`
 
-// The text with '_' for characters that may not be printed: a line break would end the comment that it stands
-// in. Names and titles come from files, so any character may occur.
+// The text with '_' for characters that may not be printed. A line break would end the comment around the
+// text. Names and titles come from files, so any character may occur.
 std::string plain(std::string_view text) {
   std::string out;
   for (std::size_t at = 0; at < text.size();) {

@@ -64,7 +64,7 @@ std::vector<unsigned char> without_colour_space(const std::vector<unsigned char>
   return out;
 }
 
-// The simplified interface returns errors as values: no longjmp through C++ frames.
+// The simplified interface returns errors as values, so no longjmp crosses C++ frames.
 struct Image : png_image {
   Image() : png_image{} { version = PNG_IMAGE_VERSION; }
   Image(const Image&) = delete;

@@ -45,7 +45,8 @@ struct FrictionStep {
   glm::dvec3 target{0.0};  // new target of the proxy, instead of the frictionless one
   bool sliding = false;    // must be passed to the next tick
   double normal_N = 0.0,
-         tangential_N = 0.0;  // of the pull on the proxy before it moves; normal_N > 0: it presses
+         tangential_N =
+             0.0;  // parts of the pull on the proxy before it moves; normal_N > 0: the proxy presses
 };
 
 // The proxy must be feasible, and must have been carried along with the surface since the last tick. The pull
@@ -120,7 +121,7 @@ inline void end_damping(DampingState& state) noexcept {
 // ---- force shading (thesis, Fig 5; Morgenbesser & Srinivasan 1996) ----
 
 // Limit for the angle between a shaded normal and the surface's own normal. A larger angle is reduced to the
-// limit: at the silhouette of a coarse mesh, or over a true sharp edge, the force must still push out.
+// limit. At the silhouette of a coarse mesh, or over a true sharp edge, the force must still push out.
 inline constexpr double kLeastShadedCosine = 0.5;  // 60°
 
 // Turns `shaded` towards `normal` until shaded·normal >= least_cosine. Both should be unit vectors. Returns

@@ -344,7 +344,8 @@ class NetBuilder {
 // at once, so their order does not matter. Every edge of the net is in two quads. So a sum over quads counts
 // each neighbour twice, and its mean is the mean of the neighbours.
 void relax(Net& net, double share, std::vector<glm::dvec3>& sum, std::vector<std::uint32_t>& count) {
-  // Unit: spacing. It ends short of the cell's wall, where the vertices of two cells could meet.
+  // Unit: spacing. The reach ends short of the cell's wall, because at the wall the vertices of two cells
+  // could meet.
   constexpr double kReach = 0.49;
   sum.assign(net.positions.size(), glm::dvec3(0.0));
   count.assign(net.positions.size(), 0);

@@ -31,8 +31,8 @@ class BrickGrid {
   // log2 of the edge of a brick (cells), its edge, its number of cells
   static constexpr int kShift = 3, kEdge = 1 << kShift, kCells = kEdge * kEdge * kEdge;
 
-  // `cell_m` must be positive and finite, else std::invalid_argument. `origin`: a point near the contents, so
-  // that cells are exact far from the world's origin.
+  // Throws std::invalid_argument if `cell_m` is not positive and finite. `origin`: a point near the contents,
+  // so that cells are exact far from the world's origin.
   BrickGrid(double cell_m, const glm::dvec3& origin);
 
   [[nodiscard]] double cell_m() const noexcept { return cell_m_; }
@@ -208,7 +208,7 @@ class BrickIndex : public BrickGrid {
   }
 
   // Makes the bitmap over the existing bricks, and room for `more` bricks. These need no allocation when they
-  // are added. Those beyond the bitmap share its outermost units.
+  // are added. Bricks beyond the bitmap share its outermost units.
   template <class Moved>
   void seal(std::size_t more, Moved&& moved) {
     table_.seal(more, moved);

@@ -3,9 +3,9 @@
 // the entries. A byte per place selects the place to read, and these bytes fit into a cache. So a look-up in
 // a large table waits for memory once.
 //
-// Places are in chunks of seven. A chunk's word has a tag for each place (0: free), and the number of entries
-// that found the chunk full and passed on to a later chunk. A search for a missing entry therefore ends
-// without reading an entry (Bronson & Shi 2019, F14). Adding or erasing moves no other entry: indices of
+// Places are in chunks of seven. A chunk's word has a tag for each place (0: free). It also has the number of
+// entries that found the chunk full and passed on to a later chunk. A search for a missing entry therefore
+// ends without reading an entry (Bronson & Shi 2019, F14). Adding or erasing moves no other entry: indices of
 // places are valid until the table grows, which happens on load only.
 #pragma once
 

@@ -19,7 +19,7 @@ class SurfaceCells {
   // approximate a curved surface. `object_bit`: the object's bit in the result of objects_in().
   void add_triangle(std::uint64_t object_bit, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
                     double margin_m = 0.0);
-  // After the last triangle: frees spare memory, and makes the bitmap for fast queries.
+  // Frees spare memory, and makes the bitmap for fast queries. Call it after the last triangle.
   void seal();
 
   // Is there surface in a brick that the box touches?

@@ -22,7 +22,7 @@ namespace hybrid {
 
 class MovingSurfaceLayer {
  public:
-  // `object_bit`: the object's bit in the result of objects_in(). Allocates; on load.
+  // `object_bit`: the object's bit in the result of objects_in(). Allocates; for use while a scene is loaded.
   void add(std::uint32_t object, std::uint64_t object_bit, std::shared_ptr<const SurfaceCells> cells,
            const glm::dvec3& position, const glm::dquat& rotation);
 

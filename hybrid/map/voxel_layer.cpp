@@ -10,7 +10,7 @@ namespace hybrid {
 namespace {
 
 constexpr std::size_t kBlocksOfNewBrick = 4;  // blocks to reserve; a surface fills about half of the 8
-// Voxels expected per block on load. A surface has 10 per block; expecting fewer leaves spare blocks for
+// Voxels expected per block on load. A surface has 10 per block; expecting only 9 leaves spare blocks for
 // motion.
 constexpr std::size_t kVoxelsOfBlock = 9;
 

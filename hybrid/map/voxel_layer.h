@@ -54,7 +54,7 @@ class VoxelLayer {
  private:
   // log2 of the edge of a block (cells), its edge, its number of cells
   static constexpr int kBlockShift = 2, kBlockEdge = 4, kBlockCells = 64;
-  // most occupied cells of a block whose links are stored without gaps
+  // greatest number of occupied cells of a block whose links are stored without gaps
   static constexpr std::size_t kPacked = 25;
   // A full block's array is freed when fewer cells than this are occupied.
   static constexpr std::size_t kUnpackBelow = 17;

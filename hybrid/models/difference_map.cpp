@@ -30,7 +30,7 @@ bool is_soft(const BuiltScene& built, const std::string& object) {
   return std::ranges::any_of(built.world->soft, [&](const SoftBody& body) { return body.name == object; });
 }
 
-// A force without tissue comes from something rigid that lies over it.
+// A force without tissue comes from a rigid object that covers the tissue.
 bool is_blocked(const RestForce& rest) {
   return !rest.tissue && glm::length(rest.force_N) > 0.0;
 }
@@ -41,7 +41,7 @@ std::string why_no_difference_map(const World& a, const World& b) {
   return why_no_take_over(a, b);
 }
 
-// A tool that is a point has the size of a voxel here.
+// For a tool that is a point, the size of a voxel stands in for its radius.
 DifferenceMap::DifferenceMap(const std::string& object, const polygon::TriangleMesh& surface,
                              const BuiltScene& a, const BuiltScene& b, double depth_m, double floor_N)
     : a_(a),

@@ -25,7 +25,7 @@ constexpr std::size_t kPasses = 3;
 struct GivenObject {
   std::string name;
   bool touched = false;
-  glm::dvec3 extent_m{0.0};  // of the drawn surface of a rigid object
+  glm::dvec3 extent_m{0.0};  // edges of the box around the drawn surface of a rigid object
 };
 
 glm::dvec3 extent_of(const RigidObject& object) {
@@ -116,7 +116,7 @@ class ModelsRun {
 
   ModelsInScene run() {
     std::vector<GivenObject> compared = compared_objects();
-    // Soft objects first: there the models differ most.
+    // Soft objects come first, because their models differ most.
     std::ranges::stable_sort(compared, {}, [&](const GivenObject& o) { return soft_index(o.name) ? 0 : 1; });
     plan(compared.size());
     find_reference(touches_soft());
@@ -139,8 +139,7 @@ class ModelsRun {
     return std::ranges::any_of(objects_, [&](const TunableObject& o) { return touched(o.own.object); });
   }
 
-  // Soft objects that the scene renders by the proxy and that the path touches get voxels as their other
-  // model.
+  // A soft object that the scene renders by the proxy gets voxels as its other model, if the path touches it.
   void open_proxies() {
     std::vector<std::string> opened;
     for (SoftDescription& soft : scene_.soft) {
@@ -186,7 +185,7 @@ class ModelsRun {
   }
 
   void plan(std::size_t compared) {
-    constexpr double kUsualRows = 7.0;  // of an object
+    constexpr double kUsualRows = 7.0;  // usual number of models of an object
     progress_.plan(static_cast<double>(compared) * kUsualRows * static_cast<double>(kPasses));
     if (!touches_soft()) return;
     progress_.plan(truth_weight(truth_plan()));
@@ -249,8 +248,9 @@ class ModelsRun {
     });
   }
 
-  // The reference's course, with the ticks marked in which the object is touched: those in which the scene as
-  // given touches it, and if no other soft object is touched, those in which the reference does.
+  // The reference's course, with marks at the ticks in which the object is touched. A tick is marked if the
+  // scene as given touches the object. If the path touches no other soft object, ticks in which the reference
+  // touches anything soft are marked too.
   [[nodiscard]] ForceCourse reference_for(const std::string& object, const ForceCourse& given) const {
     if (!result_.truth) return given;
     ForceCourse reference = result_.truth->course;

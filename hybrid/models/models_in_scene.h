@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The models of each object of a scene side by side: each variant of the scene is played whole, along the
-// scene's path, by the engine of `run` on an ideal device, and compared with one reference.
+// The models of each object of a scene side by side. Each variant of the scene is played whole, along the
+// scene's path, by the engine of `run` on an ideal device. All are compared with one reference.
 #pragma once
 
 #include <filesystem>
@@ -14,12 +14,12 @@
 namespace hybrid {
 
 struct ModelsOptions {
-  std::string object{};           // the object that is varied; empty: all that the path touches
+  std::string object{};           // the object that is varied; empty: all objects that the path touches
   std::filesystem::path cache{};  // folder that keeps the reference, shared with tune(); empty: not kept
   Progress progress{};
 };
 
-// What a hand feels of the object along the path. Only ticks count in which the object is touched.
+// Figures that a hand feels of the object along the path. Only ticks in which the object is touched count.
 struct FeltModel {
   double force_p50_N = 0.0, force_max_N = 0.0;
   std::optional<double> onset_s{};                                 // first force above the floor of the JND
@@ -29,10 +29,10 @@ struct FeltModel {
 };
 
 struct ModelRow {
-  std::string name{}, words{};  // as in Variant, like the next two
+  std::string name{}, words{};  // these and the next two are as in Variant
   std::optional<Setting> setting{};
   std::string left_out{};  // why it was not played; empty if it was
-  ForceCourse course{};    // soft: the object is touched
+  ForceCourse course{};    // CourseTick::soft: the object is touched
   FeltModel felt{};
   Percentiles tick_us{};  // over all ticks of the session; each is the median over the passes
   double load_s = 0.0;
@@ -49,11 +49,11 @@ struct ObjectModels {
   bool rigid = false;            // the scene has it as [[rigid]]
   bool alone = true;             // the path touches nothing else
   std::vector<ModelRow> rows{};  // the first is the scene as given
-  ForceCourse reference{};       // soft: the object is touched
+  ForceCourse reference{};       // CourseTick::soft: the object is touched
   FeltModel reference_felt{};
-  std::vector<double> depth_m{};  // of the tool's centre in the undeformed object, for each tick
+  std::vector<double> depth_m{};  // depth of the tool's centre in the undeformed object, for each tick
   bool depth_from_proxy = true;   // false: travel of the device since the first touch, opposite to the force
-  std::optional<TickRange> contact{};  // the first one
+  std::optional<TickRange> contact{};  // first contact with the object
   std::optional<StiffnessMatch> match{};
 };
 
@@ -63,11 +63,11 @@ struct ModelsInScene {
   std::vector<std::string> untouched{};  // objects that the path does not touch
   std::optional<Truth> truth{};          // empty: nothing soft is touched, and the scene as given is exact
   double floor_N = 0.04, dt_s = 1e-3;
-  double stiffness_N_per_m = 0.0;  // of the tool's coupling, as given
+  double stiffness_N_per_m = 0.0;  // stiffness of the tool's coupling, as given
 };
 
 // `as_read`: from read_scene(). Throws SceneError. Throws std::runtime_error: the path touches nothing, or
-// not the object that was asked for.
+// does not touch the object that was asked for.
 ModelsInScene models_in_scene(const Scene& as_read, const ModelsOptions& options);
 
 }  // namespace hybrid

@@ -79,8 +79,8 @@ ComparedModel drawn_course(std::string name, const ForceCourse& course, const Ob
   return model;
 }
 
-// Force over depth is drawn without the proxy as it is: its force is far above the others, which would all
-// lie on the axis.
+// Force over depth is drawn without the unmatched proxy. Its force is so large that all other lines would lie
+// on the axis.
 Figure object_figure(const ModelsInScene& models, const ObjectModels& object, const std::string& title) {
   const std::string prefix = models.objects.size() > 1 ? object.object + ": " : "";
   const ComparePlotOptions options{.reference = 0, .jnd_share = kJndShare, .jnd_floor_N = models.floor_N};

@@ -22,7 +22,7 @@ namespace {
 constexpr double kClearlyCheaper = 0.9;
 constexpr const char* kByFinger = "stiffness (finger)";
 
-// Through a tool. The difference that only a finger feels does not count.
+// Does a hand with a tool feel a difference? A difference that only a finger feels does not count.
 bool told_through_tool(const ModelRow& row, const ObjectModels& object) {
   return std::ranges::any_of(told_apart_by(row, object),
                              [](const std::string& by) { return by != kByFinger; });
@@ -162,7 +162,7 @@ std::string named(const ModelRow& row) {
   return row.name == kAsGiven ? "the scene's own model" : fmt::format("{} ({})", row.name, row.words);
 }
 
-// The geometry of a rigid object is exact, so that the warning is about soft ones.
+// A warning if the reference itself is not exact. The geometry of a rigid object is always exact.
 std::string warning(const ModelsInScene& models, const ObjectModels& object) {
   if (object.rigid || !models.truth || models.truth->error_jnd() <= 1.0) return {};
   return fmt::format(
@@ -171,7 +171,7 @@ std::string warning(const ModelsInScene& models, const ObjectModels& object) {
       models.truth->error_jnd());
 }
 
-// Doubt about a model's error that lies within the reference's own error of one JND.
+// A caveat if the reference's own error leaves open whether the model's error is above one JND.
 std::string doubt(const ModelsInScene& models, const ObjectModels& object, const ModelRow& row) {
   const double own = models.truth ? models.truth->error_jnd() : 0.0;
   if (object.rigid || own > 1.0 || std::fabs(row.felt.error.worst_jnd() - 1.0) >= own) return {};
@@ -254,7 +254,8 @@ std::optional<std::size_t> cheapest_untold(const ObjectModels& object) {
   for (std::size_t n = 0; n < object.rows.size(); ++n) {
     const ModelRow& row = object.rows[n];
     if (!row.left_out.empty() || !row.faults.empty() || told_through_tool(row, object)) continue;
-    if (row.coupling_N_per_m() && !object.alone) continue;  // it would change the other objects, too
+    if (row.coupling_N_per_m() && !object.alone)
+      continue;  // another coupling would change the other objects, too
     untold.push_back(n);
     least_us = std::min(least_us, row.tick_us.p999);
   }

@@ -16,7 +16,7 @@ namespace hybrid {
 std::vector<std::string> told_apart_by(const ModelRow& row, const ObjectModels& object);
 
 // The cheapest of the rows that a hand with a tool cannot tell from the reference, by the p99.9 of the tick.
-// Rows whose times are too near to the least one to tell count as equally cheap. Among these the scene as
+// Rows whose times can hardly be told from the least time count as equally cheap. Among these the scene as
 // given comes first, then the most accurate row. Empty: a hand tells every row from the reference.
 std::optional<std::size_t> cheapest_untold(const ObjectModels& object);
 
@@ -24,11 +24,11 @@ std::optional<std::size_t> cheapest_untold(const ObjectModels& object);
 std::string models_verdict(const ModelsInScene& models, const ObjectModels& object);
 
 std::string models_words(const ModelsInScene& models);
-// The reference and its own error; the meaning of the figures; notes. One sentence or so a line.
+// The reference and its own error; the meaning of the figures; notes. A line has about one sentence.
 std::string models_legend(const ModelsInScene& models);
-// How far the model's stiffness is off that of the reference, as a share; empty if either has none.
+// Relative error of the model's stiffness against the reference's. Empty if either has no stiffness.
 std::optional<double> stiffness_off(const ModelRow& row, const ObjectModels& object);
-// How much later than the reference the model is felt (ms); empty if either is not felt.
+// Delay of the model's onset after the reference's (ms). Empty if either is not felt.
 std::optional<double> onset_later_ms(const ModelRow& row, const ObjectModels& object);
 nlohmann::ordered_json models_json(const ModelsInScene& models);
 // For each object: forces and differences from the reference over time, and force over depth.

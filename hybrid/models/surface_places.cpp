@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-constexpr float kNever = -1.0F;  // squared distance of a vertex that is no place: it has no triangle
+constexpr float kNever = -1.0F;  // marks a vertex that cannot be a place, because it has no triangle
 constexpr float kFar = std::numeric_limits<float>::max();
 
 }  // namespace
@@ -96,7 +96,8 @@ std::vector<float> SurfacePlaces::spread(std::span<const float> of_places) const
       values[v] = nearest;
       continue;
     }
-    // The furthest of the nearest places weighs nothing, so that values do not jump where it is another one.
+    // The furthest of the nearest places has weight 0, so that values do not jump where another place
+    // replaces it.
     const bool few = vertex.squared.back() == kFar;
     const float reach = std::sqrt(vertex.squared.back());
     float sum = 0.0F, weights = 0.0F;

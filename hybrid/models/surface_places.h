@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Places on a surface, spread evenly however many there are, and values between them.
+// Places that are spread evenly on a surface for any number of them, and interpolation between them.
 #pragma once
 
 #include <array>
@@ -27,12 +27,12 @@ class SurfacePlaces {
   // The next place. Empty: every vertex is within `gap_m` of a place.
   [[nodiscard]] std::optional<SurfacePlace> next(double gap_m);
   [[nodiscard]] std::size_t given() const { return given_; }
-  // How far a vertex is at most from the nearest place.
+  // The greatest distance of a vertex from its nearest place.
   [[nodiscard]] double gap_m() const;
 
-  // The value at each vertex, from the values of all places in their order: the mean of the places nearest to
-  // the vertex, weighted by distance (Franke & Little 1980). NaN is a value that is not known. A vertex whose
-  // nearest place has such a value has it, too.
+  // The value at each vertex, from the values of all places in their order. It is the mean of the places
+  // nearest to the vertex, weighted by distance (Franke & Little 1980). NaN is a value that is not known. If
+  // the nearest place has no known value, the vertex has none either.
   [[nodiscard]] std::vector<float> spread(std::span<const float> of_places) const;
   // The part of the surface around each vertex (m²). Their sum is the surface's area.
   [[nodiscard]] const std::vector<double>& areas_m2() const { return areas_m2_; }
@@ -42,7 +42,7 @@ class SurfacePlaces {
   struct Vertex {
     glm::vec3 at{0.0F}, facing{0.0F};             // m, from the middle of the surface; normal · apart_m
     std::array<std::uint32_t, kNearest> place{};  // the nearest places, the nearest first
-    std::array<float, kNearest> squared{};        // of their distances (m²)
+    std::array<float, kNearest> squared{};        // squares of the distances (m²)
   };
 
   std::vector<Vertex> vertices_;

@@ -14,11 +14,12 @@ namespace hybrid {
 namespace {
 
 constexpr std::array kCoarser{1.5, 2.0};  // factors on the spacing
-// A rigid object as voxels. A contact should be four voxels wide; a cap bounds the number of voxels.
+// A rigid object as voxels. A contact should be four voxels wide. kMostVoxelsAlong bounds the number of
+// voxels.
 constexpr double kVoxelsPerRadius = 2.0;  // of the tool's radius
 constexpr double kMostVoxelsAlong = 80.0;
 constexpr double kFewestVoxelsAcross = 2.0;
-constexpr const char* kHardMaterial = "as voxels: hard";  // unlike the names that people give
+constexpr const char* kHardMaterial = "as voxels: hard";  // a name that no scene is likely to have
 
 Setting changed(const std::vector<TunableObject>& objects, std::size_t index, const ObjectSetting& one) {
   Setting setting = own_setting(objects);

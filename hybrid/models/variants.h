@@ -16,9 +16,9 @@ struct Variant {
   std::string name;   // "six-link", "proxy", …; equal for equal variants of all objects
   std::string words;  // its values, such as "3 mm six-link"
   Scene scene{};      // on an ideal device, with all models decided
-  // What makes it, in the scene's file. Empty: the file cannot say it with a few values.
+  // The values in the scene's file that make the variant. Empty: a few values cannot make it.
   std::optional<Setting> setting{};
-  std::string left_out{};  // why the scene cannot have it, in words; empty: it can
+  std::string left_out{};  // why the scene cannot have this variant, in words; empty: it can
 };
 
 // In the scene file of a variant, this text stands before the reason of each change (edited_scene()).

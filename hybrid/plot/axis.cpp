@@ -15,8 +15,8 @@ constexpr double kOffAxis = std::numeric_limits<double>::quiet_NaN();
 std::vector<double> decade_ticks(double from, double to, int wanted) {
   const int low = static_cast<int>(std::floor(std::log10(from) + 1e-9));
   const int high = static_cast<int>(std::ceil(std::log10(to) - 1e-9));
-  // Numbers between the powers of ten are shown only if there are few decades, or fewer than two powers: one
-  // tick gives no scale. With many decades, some powers are left out too.
+  // Numbers between the powers of ten are shown only if there are few decades, or fewer than two powers. A
+  // single tick would give no scale. With many decades, some powers are left out too.
   const double first = std::ceil(std::log10(from) - 1e-9), last = std::floor(std::log10(to) + 1e-9);
   const bool between = 3.0 * std::log10(to / from) <= wanted || last < first + 1.0;
   const int stride = std::max(1, (high - low) / std::max(wanted, 1));

@@ -14,7 +14,7 @@
 namespace hybrid {
 namespace {
 
-// Of the page; all in pixels.
+// Size of the page and its frame (pixels).
 constexpr double kCostWidth = 960.0, kCostHeight = 620.0;
 constexpr double kFrameLeft = 76.0, kFrameRight = 930.0, kFrameTop = 70.0, kFrameBottom = 560.0;
 constexpr double kSmallestMark = 4.0, kLargestMark = 14.0;  // radius
@@ -60,7 +60,7 @@ class CostErrorPlot {
 
  private:
   struct Name {
-    double from, to, y;  // y: of the base line
+    double from, to, y;  // y: base line
   };
 
   static bool drawn(const CostErrorMark& m) { return m.cost_us > 0.0; }
@@ -161,7 +161,7 @@ class CostErrorPlot {
     }
   }
 
-  // Within the frame, and beside all other names.
+  // Is the name within the frame, and clear of all other names?
   [[nodiscard]] bool has_room(const Name& name) const {
     return name.from > kFrameLeft && name.to < kFrameRight && name.y > kFrameTop + kNameApart &&
            name.y < kFrameBottom && std::ranges::none_of(names_, [&](const Name& other) {

@@ -227,7 +227,7 @@ Series course_of(const Contact& contact, std::span<const TraceRow> rows) {
   return line;
 }
 
-// The presses or the strokes of a session, one line for each. There is no group without any.
+// Adds a group with a line for each press, or for each stroke, of a session. Without any, adds no group.
 void add_courses(Figure& figure, std::span<const TraceRow> rows, std::span<const Touched> things,
                  std::vector<Contact> contacts, bool strokes) {
   std::erase_if(contacts, [&](const Contact& contact) { return contact.stroke != strokes; });

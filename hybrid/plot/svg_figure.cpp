@@ -16,8 +16,9 @@
 namespace hybrid {
 namespace {
 
-constexpr double letter = 6.4;          // pixels; upper estimate of a letter's mean width at font size 12
-constexpr double most_points = 18'000;  // most points of all lines together; a point takes about 12 bytes
+constexpr double letter = 6.4;  // pixels; upper estimate of a letter's mean width at font size 12
+constexpr double most_points =
+    18'000;  // greatest number of points in all lines; a point takes about 12 bytes
 constexpr double lane_height = 22.0;
 constexpr std::size_t most_lanes = 24;
 constexpr double kTitleLetter = 7.9;  // pixels; upper estimate of a bold letter's mean width at font size 13
@@ -74,7 +75,7 @@ std::string path_of(const std::vector<PlotPoint>& page) {
   return d;
 }
 
-// Positions of values on the page; not finite for a value without one.
+// Positions of values on the page. A value without a position gets one that is not finite.
 std::vector<double> on_page(const std::vector<double>& values, std::size_t count, const Axis& axis) {
   std::vector<double> page(count);
   for (std::size_t i = 0; i < count; ++i) page[i] = axis.page(values[i]);

@@ -190,7 +190,7 @@ void threads_suite(const BenchCommand& command, std::FILE* words, nlohmann::orde
   for (const bench::ThreadsRow& row : rows) json.push_back(bench::to_json(row));
 }
 
-// In "all" without scenes: those that come with the program.
+// If the command names no scenes, runs the scenes that come with the program.
 void scenes_suite(const BenchCommand& command, std::FILE* words, nlohmann::ordered_json& json) {
   bench::ScenesBenchOptions options{.scenes = command.scenes, .progress = progress_on_terminal()};
   if (options.scenes.empty()) options.scenes = bench::shipped_scenes();

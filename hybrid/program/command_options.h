@@ -19,7 +19,7 @@ void add_report(CLI::App& sub, ReportRequest& report);
 void add_compare(CLI::App& app, int& status);
 void add_study(CLI::App& app, int& status);
 
-// Options of `compose` that say what becomes of labels and intensities: --names, --rigid, --soft, --range,
+// Options of `compose` that select labels and intensities of tissue: --names, --rigid, --soft, --range,
 // --spacing. The first three need `labels`.
 void add_tissue_options(CLI::App& sub, ComposeOptions& options, CLI::Option* labels);
 

@@ -70,15 +70,16 @@ struct DevicesCommand {
 int devices(const DevicesCommand& command);
 
 struct CompareCommand {
-  std::vector<std::filesystem::path> scenes;  // one: an object of it by several models; more: whole scenes
-  std::string samples = "all";                // only for whole scenes; as in RunCommand
-  std::string object;                         // empty: the first suitable object
-  MeasuredOptions measured;                   // empty file: no measurement
+  std::vector<std::filesystem::path>
+      scenes;                   // one scene: one of its objects by several models; several: whole scenes
+  std::string samples = "all";  // only for whole scenes; as in RunCommand
+  std::string object;           // empty: the first suitable object
+  MeasuredOptions measured;     // empty file: no measurement
   std::filesystem::path plot;
   bool classic = false;         // the plot also has the thesis's algorithm
-  bool models = false;          // one scene, whole: its objects by other models
-  bool write_variants = false;  // of `models`: as scenes, beside the given one
-  std::filesystem::path cache;  // of `models`; empty: nothing is kept
+  bool models = false;          // plays one whole scene with other models of its objects
+  bool write_variants = false;  // with `models`: writes the variants as scenes beside the given one
+  std::filesystem::path cache;  // with `models`: folder of the kept reference; empty: nothing is kept
   ReportRequest report;
   std::string json;
 };
@@ -102,7 +103,7 @@ int tune_scene(const TuneCommand& command);
 
 struct StudyCommand {
   std::vector<std::filesystem::path> scans;
-  std::vector<std::string> labels;  // as of pair_scans()
+  std::vector<std::string> labels;  // as in pair_scans()
   StudyOptions options;             // without `scans`
   std::string json;
   std::string command_line;  // as it was typed

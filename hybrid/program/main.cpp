@@ -374,7 +374,7 @@ int flushed(int status) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large then is a write error
+  std::signal(SIGXFSZ, SIG_IGN);  // then a write beyond the limit of the file size fails with an error
   hybrid::end_at_once_on_signals();
   CLI::App app(kAbout, "hybrid");
   app.require_subcommand(1);

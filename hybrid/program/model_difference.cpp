@@ -65,7 +65,7 @@ void ModelDifference::ask(const ModelComparison& comparison, const ViewedScene& 
     std::string why_not;
     try {
       run(job);
-    } catch (const Stopped&) {  // as asked for
+    } catch (const Stopped&) {  // the comparison was stopped on request
     } catch (const std::exception& e) {
       why_not = e.what();
     }

@@ -16,7 +16,7 @@ namespace hybrid {
 
 class ModelDifference {
  public:
-  // `beside`: a session goes on meanwhile, so the threads have the lowest priority.
+  // `beside`: a session runs at the same time, so the threads have the lowest priority.
   ModelDifference(const ViewCommand& command, bool beside) : command_(command), beside_(beside) {}
   ModelDifference(const ModelDifference&) = delete;
   ModelDifference& operator=(const ModelDifference&) = delete;
@@ -24,8 +24,8 @@ class ModelDifference {
   ModelDifference& operator=(ModelDifference&&) = delete;
   ~ModelDifference() { stop(); }
 
-  // Begins a comparison in the scene that is shown, with the values of the snapshot; an earlier one ends. A
-  // comparison without an object only ends it, and its result stays.
+  // Ends an earlier comparison, and begins one in the scene that is shown, with the values of the snapshot.
+  // If `comparison` has no object, none begins, and the result of the earlier one stays.
   void ask(const ModelComparison& comparison, const ViewedScene& viewed, const Snapshot& now);
   // Ends a comparison and drops its result. Call it when another scene is shown.
   void forget();
@@ -36,7 +36,7 @@ class ModelDifference {
   [[nodiscard]] std::shared_ptr<const FeltDifference> found() const;
   // The progress, in words; empty: nothing is compared.
   [[nodiscard]] std::string in_words() const;
-  // Why the models cannot be compared, once; else empty.
+  // Returns the reason why the models could not be compared, and forgets it. Empty if there is none.
   [[nodiscard]] std::string take_error();
 
  private:
@@ -48,7 +48,7 @@ class ModelDifference {
   struct Job {
     ModelComparison comparison;
     std::string text;               // of the scene
-    std::vector<NamedEdit> edits;   // values that are not the text's
+    std::vector<NamedEdit> edits;   // values that differ from those of the text
     polygon::TriangleMesh surface;  // of the object
     std::size_t object = 0;         // of DrawnScene::objects
     double floor_N = 0.0;           // of the JND
@@ -63,7 +63,7 @@ class ModelDifference {
   bool beside_;
   std::uint64_t comparisons_ = 0, numbers_ = 0;
   std::atomic<bool> stop_{false};
-  mutable std::mutex guard_;  // of the next three
+  mutable std::mutex guard_;  // protects the next three members
   std::shared_ptr<const FeltDifference> found_;
   std::string words_, error_;
   std::thread thread_;

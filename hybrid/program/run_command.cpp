@@ -76,7 +76,8 @@ ViewSettings view_of(const RunCommand& command) {
   return view;
 }
 
-// The session as a video. Drawing begins with the first frame; an error ends it and is kept until keep().
+// The session as a video. Drawing begins with the first frame. An error ends the drawing, and keep() throws
+// it.
 class RunVideo {
  public:
   RunVideo(const std::filesystem::path& file, const DrawnScene& drawn, const ViewSettings& view)
@@ -113,7 +114,7 @@ class RunVideo {
 
 }  // namespace
 
-// All but the difference of two models, which a session does not know.
+// All colours except that of the difference between two models, which only the viewer computes.
 std::vector<std::string> tissue_colours() {
   std::vector<std::string> names;
   for (const std::string_view name : kTissueColours) {

@@ -66,7 +66,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     try {
       if (auto next = changer.wait(*viewed)) {
         ChangeMade made = player.change_scene(next->scene, next->built, next->drawn, next->text);
-        request.asked = nullptr;  // the points belong to the scene before
+        request.asked = nullptr;  // the points belong to the previous scene
         effect = show_changed(window, viewed, std::move(next), std::move(made), comparison);
         effect->forces = comparison.wait();  // so that frames are reproducible
         difference.forget();
@@ -81,7 +81,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
       PastView::leave(window);
     }
     const bool shows_past = back && !input.go_on;
-    if (!shows_past) past.forget();  // kept states come and go
+    if (!shows_past) past.forget();  // the kept states change meanwhile
     request.paused = request.paused || shows_past;
     const double session_began_s = thread_time_s();
     for (ahead_s += kScriptFrame_s; ahead_s > 0.5 / player.rate_hz(); ahead_s -= 1.0 / player.rate_hz()) {

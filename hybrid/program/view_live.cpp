@@ -17,9 +17,9 @@
 namespace hybrid {
 namespace {
 
-// Keeps the forces between objects for the window's list. To compute them the session is held for a moment:
-// a simulated hand does not notice, because held time does not count. A real hand would, so with a real
-// device they are computed only while the session is paused.
+// Keeps the forces between objects for the window's list. The session is held for a moment while they are
+// computed. A simulated hand does not feel this, because held time does not count. A real hand would feel it,
+// so with a real device they are computed only in a pause.
 class PressWatch {
  public:
   const std::vector<PairPress>& presses(const WindowInput& input, const PlayRequest& request,
@@ -43,7 +43,7 @@ class PressWatch {
   static constexpr std::chrono::milliseconds kEvery{200};  // least time between two updates of the list
   static constexpr int kRest = 19;  // the session is held for at most one part in 20 of the time
   std::vector<PairPress> presses_;
-  std::uint64_t tick_ = kNever;  // of presses_
+  std::uint64_t tick_ = kNever;  // tick of presses_
   std::chrono::steady_clock::time_point next_{};
 };
 
@@ -75,7 +75,7 @@ SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) 
   return notes;
 }
 
-// Goes on in a changed scene when it is built. Returns whether it did.
+// The session goes on in the changed scene once that scene is built. Returns true if the scene was changed.
 bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, LiveSession& session,
                         const PlayRequest& request) {
   try {
@@ -103,7 +103,7 @@ void go_back(LiveWindow& live, LiveSession& session, const PlayRequest& request,
   }
 }
 
-// Keeps the session's state when it is time. The session stands still for at most one part in 20 of the time.
+// Keeps the session's state if one is due. The session stands still for at most one part in 20 of the time.
 void keep_state(LiveSession& session, const PlayRequest& request, Player& player, double now_s,
                 std::chrono::steady_clock::time_point& next) {
   constexpr int rest = 19;
@@ -152,7 +152,7 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
       request.asked = nullptr;
     }
     const bool shows_past = back && !input.go_on;
-    if (!shows_past) past.forget();  // kept states come and go
+    if (!shows_past) past.forget();  // the kept states change meanwhile
     request.paused = request.paused || shows_past;
     session.ask(request);
     if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the two ways to show a session share: frames of fixed time (view_frames.cpp) and a live window
-// (view_live.cpp). Both play one session, change its scene, and look back at states that it kept.
+// Parts that the two ways to show a session share: frames of fixed time (view_frames.cpp) and a live window
+// (view_live.cpp). Both play one session, change its scene, and show its kept states.
 #pragma once
 
 #include <memory>
@@ -30,7 +30,8 @@ namespace hybrid {
 [[nodiscard]] SessionNotes notes_of(const Player& player, double t_s, const std::string& message,
                                     const std::optional<ChangeEffect>& effect);
 
-// Shows the scene in which the session goes on. The one before is kept until the forces of both are compared.
+// Shows the scene in which the session goes on. The previous scene is kept until the forces of both are
+// compared.
 [[nodiscard]] ChangeEffect show_changed(Window& window, std::unique_ptr<ViewedScene>& viewed,
                                         std::unique_ptr<ViewedScene> next, ChangeMade made,
                                         ChangeComparison& comparison);
@@ -45,10 +46,10 @@ class PastView {
   static void add_notes(const Player& player, double now_s, SessionNotes& notes);
   // The kept state that is shown; empty: the present.
   [[nodiscard]] static std::optional<std::size_t> shown(const Player& player, double now_s, double back_s);
-  // The picture of that state. It is filled again only if the state or the points are other ones.
+  // The picture of that state. It is filled again only if the state or the points have changed.
   const Snapshot& snapshot(const Player& player, std::size_t n, const AskedPoints* asked,
                            const std::shared_ptr<const FeltDifference>& difference);
-  // Call when the kept states are other ones.
+  // Call when the kept states have changed.
   void forget() { state_ = nullptr; }
   // The window shows the present again.
   static void leave(Window& window);

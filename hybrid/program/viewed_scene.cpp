@@ -66,7 +66,7 @@ void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const P
 
 void SceneChanger::start(const ViewedScene& played) {
   built_ = asked_.size();
-  // All changes since the played scene, whose text stays while this one is built.
+  // Makes all changes since the played scene. The text of that scene stays while the new one is built.
   next_ = std::async(std::launch::async, [this, &played, changes = asked_] {
     const ScopedFlushToZero flushed;  // as a replay does, so that it builds the same bits
     auto viewed = std::make_unique<ViewedScene>();
@@ -92,7 +92,7 @@ std::unique_ptr<ViewedScene> SceneChanger::poll(const ViewedScene& played) {
     return nullptr;
   }
   if (next_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return nullptr;
-  if (built_ < asked_.size()) {  // more was asked for meanwhile
+  if (built_ < asked_.size()) {  // further changes were asked for meanwhile
     start(played);
     return nullptr;
   }

@@ -21,7 +21,7 @@ struct ViewedScene {
   std::string text;                    // of this scene
   std::string file_text;               // of the scene's file when it was loaded
   std::string began_with;              // of the scene with which the session began
-  std::vector<std::string> changes{};  // those since it was loaded, in words
+  std::vector<std::string> changes{};  // changes since the scene was loaded, in words
   Scene scene;
   BuiltScene built;
   DrawnScene drawn;
@@ -65,7 +65,7 @@ class SceneChanger {
 
   const ViewCommand& command_;
   std::vector<SceneChange> asked_;
-  std::size_t built_ = 0;  // those of asked_ that the scene in `next_` has
+  std::size_t built_ = 0;  // number of changes in asked_ that the scene in `next_` has
   mutable std::mutex guard_;
   std::string step_;  // of building; guard_ protects it
   std::future<std::unique_ptr<ViewedScene>> next_;
@@ -84,7 +84,8 @@ class ChangeComparison {
 
   // `now`: the scene after the change. It must live until cancel(), or until the forces are known.
   void begin(std::unique_ptr<ViewedScene> before, const ViewedScene& now, std::unique_ptr<WorldState> after);
-  // The forces, once, when they are known. wait(): waits for them; empty if nothing is compared.
+  // poll() returns the forces once, when they are known. wait() waits for them, and returns nothing if
+  // nothing is compared.
   [[nodiscard]] std::optional<ComparedForces> poll();
   [[nodiscard]] std::optional<ComparedForces> wait();
   // Ends the comparison, if there is one. Call it before the scene after the change is dropped.
@@ -109,7 +110,7 @@ class SceneReload {
   // Call once a frame. Returns a scene when it is ready to be played on a simulated device, otherwise null.
   [[nodiscard]] std::unique_ptr<ViewedScene> poll();
   [[nodiscard]] bool loading() const { return next_.valid(); }
-  // Error of the file as it is now, with its line; empty if it has none.
+  // The error in the present file, with its line; empty if there is none.
   [[nodiscard]] const std::string& error() const { return error_; }
 
  private:
@@ -128,7 +129,7 @@ class SceneReload {
 class RestWish {
  public:
   // `says` tells the user why the comparison cannot begin. `between` calls its argument between two ticks. If
-  // `between` does not call it, the next follow() tries again.
+  // `between` does not call its argument, the next follow() tries again.
   template <class Says, class Between>
   void follow(bool wished, Player& player, Says& says, const Between& between) {
     if (wished == on_) return;

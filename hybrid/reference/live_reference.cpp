@@ -86,7 +86,7 @@ void LiveReference::take_edits_until(std::uint64_t tick) noexcept {
 }
 
 void LiveReference::run() noexcept {
-  // The lowest priority: a session has precedence, and a late reference only says less often how far it is.
+  // Takes the lowest priority. A session has precedence, and a late reference only gives fewer results.
   const sched_param none{};
   (void)sched_setscheduler(0, SCHED_IDLE, &none);
   set_flush_to_zero();  // as the tick does

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far the force of a session is from the force at rest, while the session goes on. A second session, the
+// Compares the force of a session with the force at rest, while the session goes on. A second session, the
 // reference, follows the device of the first one on a thread of its own. At the newest position it waits
 // until its tissue is at rest. Then it compares its force with the force that was felt there. The first
 // session only adds each tick to a queue.
@@ -58,14 +58,14 @@ class ReferenceSession {
 
   // Applies an edit of the session.
   void take(const Edit& edit) noexcept { (void)apply_edit(world_, *state_, edit); }
-  // Goes along these ticks to the last of them, and waits there for rest. Empty if nothing soft is in contact
-  // there, or if the tissue is not at rest after kMostTicksAtRest ticks; it relaxes on in the next call.
-  // Neither allocates nor throws.
+  // Plays these ticks to the last of them, and waits there for rest. Empty if nothing soft is in contact
+  // there, or if the tissue is not at rest after kMostTicksAtRest ticks. In this case the next call goes on
+  // waiting. Neither allocates nor throws.
   std::optional<ForceAtRest> follow(std::span<const PassedTick> passed) noexcept;
 
  private:
-  // Most ticks on the way of a call in contact, and ticks at its end. Of a longer way every second tick is
-  // played, or every third, and so on.
+  // Greatest number of ticks in contact that a call plays, and of ticks in which it then waits. If there are
+  // more ticks, every second is played, or every third, and so on.
   static constexpr std::size_t kMostTicksOnWay = 8, kMostTicksAtRest = 80;
 
   glm::dvec3 tick_at(const glm::dvec3& device_m) noexcept;
@@ -78,7 +78,7 @@ class ReferenceSession {
 // The reference session on its thread, until this object is destroyed.
 class LiveReference {
  public:
-  // Arguments: as of ReferenceSession. Allocates.
+  // Arguments as for ReferenceSession. Allocates.
   LiveReference(const World& world, std::unique_ptr<WorldState> state, double dt_s, double floor_N);
   ~LiveReference();
   LiveReference(const LiveReference&) = delete;
@@ -87,8 +87,8 @@ class LiveReference {
   LiveReference& operator=(LiveReference&&) = delete;
 
   // ---- the servo thread ----
-  // An edit is applied before the tick of its number. Of ticks that find the queue full, only the path is
-  // lost.
+  // An edit is applied before the tick of its number. A tick that finds the queue full is dropped. The
+  // reference then takes a shorter path to the next one.
   void passed(const PassedTick& tick) noexcept { (void)passed_.push(tick); }
   void edited(const Edit& edit) noexcept { (void)edits_.push(edit); }
 
@@ -107,7 +107,7 @@ class LiveReference {
   SpscRing<Edit> edits_{kEditsWaiting};
   ForcesAtRest found_{kResultsWaiting};
   std::vector<PassedTick> way_;
-  std::optional<Edit> waiting_;  // the next edit, of a later tick
+  std::optional<Edit> waiting_;  // the next edit, if it belongs to a later tick
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -28,7 +28,7 @@ class RestWatch {
     earlier_N = force_N;
     ++seen_;
   }
-  // The device moved.
+  // Call it when the device has moved.
   void begin_anew() noexcept {
     at_rest_ = false;
     seen_ = 0;

@@ -99,8 +99,8 @@ bool same(const TreeNode& a, const TreeNode& b) {
   });
 }
 
-// Takes the key out of the table and returns its value. A table that so becomes empty is taken out, too, if
-// set() may have added it.
+// Takes the key out of the table and returns its value. If the table is then empty, and set() may have added
+// it, takes out the table too.
 TreeNode take(TreeNode& root, const TextTable& table, std::string_view key) {
   TreeNode value;
   if (const TreeNode* const found = find_table(root, table)) {
@@ -220,7 +220,7 @@ bool SceneTextEditor::comment_above(const TextTable& table, const std::vector<st
   return true;
 }
 
-// A line within a string may look like a comment. Then the text reads otherwise without it, and all stay.
+// A line within a string may look like a comment. If its removal changes a value, all lines stay.
 void SceneTextEditor::remove_comments(std::string_view begin) {
   std::string changed = text_without(begin);
   try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The editor of a scene's text. Only the values that are set change: comments, order and layout stay.
+// The editor of a scene's text. It sets values; comments, order and layout stay.
 #pragma once
 
 #include <filesystem>
@@ -11,16 +11,16 @@
 
 namespace hybrid {
 
-// A table of a scene: {"tool"}, the item of a list by its key `name` as {"rigid", "plate"}, or a table within
-// one of these as {"rigid", "plate", "texture"} and {"material", "", "fat"}.
+// A table of a scene: {"tool"}. The item of a list by its key `name`: {"rigid", "plate"}. A table within one
+// of these: {"rigid", "plate", "texture"} and {"material", "", "fat"}.
 struct TextTable {
   std::string key;
   std::string name{};  // empty: `key` is a table, not a list
   std::string part{};  // empty: the table or item itself
 };
 
-// It parses the text again after each change. A change is kept only if the text then reads as before, but for
-// the value that was set.
+// The text is parsed again after each change. A change is kept only if no value differs but the one that was
+// set.
 class SceneTextEditor {
  public:
   // `file` is used in messages. Throws SceneError: the text is no TOML.

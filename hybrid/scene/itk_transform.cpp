@@ -17,15 +17,15 @@
 namespace hybrid {
 namespace {
 
-constexpr double kMeters = 1e-3;        // per unit of the file
-constexpr double kMostStretch = 1e-4;   // of a rigid map: 0.1 mm on 1 m. Rounding to floats stays below.
-constexpr std::size_t kMostShown = 20;  // characters of a wrong text that a message shows
-constexpr std::size_t kMostBytes = 1U << 20U;  // of a text; one transform has some hundred
+constexpr double kMeters = 1e-3;               // per unit of the file
+constexpr double kMostStretch = 1e-4;          // of a rigid map: 0.1 mm on 1 m; above the rounding of floats
+constexpr std::size_t kMostShown = 20;         // characters of a wrong text that a message shows
+constexpr std::size_t kMostBytes = 1U << 20U;  // of a file; one transform has some hundred bytes
 constexpr const char* kHarden =
     "in 3D Slicer harden it on the model or volume and save that instead; or save a rigid transform (.tfm)";
 
 struct ItkTransform {
-  std::size_t count = 0;  // transforms in the file; the following are those of the last one
+  std::size_t count = 0;  // number of transforms in the file; the members below are of the last one
   std::string type;       // "AffineTransform_double_3_3"
   std::vector<double> parameters, fixed;
 };
@@ -113,7 +113,7 @@ LinearMap linear_map(const ItkTransform& t) {
   return map;
 }
 
-// How far the matrix is from a rotation: the largest entry of MᵀM - 1.
+// Deviation of the matrix from a rotation: the largest entry of |MᵀM - 1|.
 double stretch_of(const glm::dmat3& matrix) {
   const glm::dmat3 product = glm::transpose(matrix) * matrix;
   double most = 0.0;

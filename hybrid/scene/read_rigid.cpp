@@ -115,7 +115,7 @@ std::string read_name(const TableReader& table) {
   return name;
 }
 
-// The pose of a transform file, which leaves no room for other keys.
+// The pose in a transform file. Other keys for the pose are refused beside it.
 Pose read_transform(const TableReader& table) {
   for (const std::string_view other : {"position", "rotation"}) {
     if (table.has(other))

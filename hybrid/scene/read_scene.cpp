@@ -218,7 +218,7 @@ void check_names(const SceneSource& source, const Scene& scene) {
   for (const SoftDescription& soft : scene.soft) take(soft.name, soft.place);
 }
 
-// Refuses anchors that are only near rigid objects if the scene has no rigid objects.
+// Refuses an object that is held only near rigid objects, if the scene has no rigid objects.
 void check_anchors(const TableReader& table, const Scene& scene, const SoftDescription& soft) {
   const bool only_by_rigid = soft.anchors.faces.empty() && soft.anchors.labels.empty();
   if (!only_by_rigid || !scene.rigid.empty()) return;

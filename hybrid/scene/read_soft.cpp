@@ -142,7 +142,7 @@ std::set<int> known_labels(const SoftSource& source) {
   } else if (const auto* volume = std::get_if<VolumeSource>(&source)) {
     for (const voxel::LabelRule& rule : volume->rules) labels.insert(rule.label);
   } else {
-    labels.insert(1);  // a voxelised mesh is of one label
+    labels.insert(1);  // a voxelised mesh has one label
   }
   return labels;
 }

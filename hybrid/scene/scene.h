@@ -94,12 +94,12 @@ struct VolumeSurfaceSource {
 };
 using RigidSource = std::variant<MeshSource, BallPrimitive, BoxPrimitive, PlanePrimitive, CapsulePrimitive,
                                  VolumeSurfaceSource>;
-// Prescribed motion of a rigid object, which no contact changes. The object's `position` and `rotation` are
-// its pose at the start.
+// Prescribed motion of a rigid object. No contact changes this motion. The object's `position` and `rotation`
+// are its pose at the start.
 struct SpinDescription {           // rotation about an axis that follows the path
   glm::dvec3 axis{0.0, 0.0, 1.0};  // unit vector, scene frame
   glm::dvec3 about_m{0.0};         // a point of the axis at the start, scene frame
-  double rate_rad_per_s = 0.0;     // rate of endless rotation; without effect unless amplitude_rad is 0
+  double rate_rad_per_s = 0.0;     // rate of endless rotation; used only if amplitude_rad is 0
   double amplitude_rad = 0.0, frequency_hz = 0.0;
 };
 struct PathMotion {
@@ -186,8 +186,8 @@ struct Thinning {
 // How the object is rendered: by its voxels, by the proxy as a rigid object, or by the proxy if that is
 // enough (automatic).
 enum class SoftModel : std::uint8_t { voxels, proxy, automatic };
-// Widths of the finest nested patch (voxel::SoftObject::use_composite_grid()). A wide tool has less, because
-// more would exceed the work of a tick.
+// Widths of the finest nested patch (voxel::SoftObject::use_composite_grid()). A wide tool has a narrower
+// patch, because a wider one would exceed the work of a tick.
 inline constexpr int kPatchMargin = 6, kLeastPatchMargin = 4, kMostPatchMargin = 10;
 inline constexpr double kLeastWork = 0.1;
 
@@ -203,13 +203,13 @@ struct SoftDescription {
   double work = 1.0;              // share of the work at the tool's contact that a tick does
   int patch = kPatchMargin;       // on nested patches: voxels of the finest one beyond the contact
   std::optional<Thinning> thinning{};
-  // Each voxel of the source is divided into split³ equal ones, so the shape stays. No key of a scene: it is
-  // for references.
+  // Each voxel of the source is divided into split³ equal ones, so the shape stays. Set by references; there
+  // is no such key of a scene.
   int split = 1;
-  bool patches = true;  // false: never on nested patches. No key of a scene, either: it is for baselines.
+  bool patches = true;               // false: never on nested patches. Set by baselines; no key of a scene.
   Energy energy = Energy::six_link;  // energy of materials that state none
-  // As in the file. load_scene() moves objects that are felt through the proxy to Scene::rigid, so all that
-  // stay in Scene::soft are felt through their voxels.
+  // As in the file. load_scene() moves objects that are felt through the proxy to Scene::rigid. All objects
+  // that stay in Scene::soft are felt through their voxels.
   SoftModel model = SoftModel::voxels;
   SourcePlace place, source_place;
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads the keys of one table of a scene file: types, units, bounds and unknown keys. Every refusal names its
-// place. If errors are gathered, reading goes on after a wrong number, text or file: the error is listed and
-// some valid value stands in, so that all keys of a table are checked. A violated rule among several keys is
-// an error only if nothing else is wrong in the table.
+// place. If errors are gathered, a wrong number, text or file is listed, and a valid value stands in for it.
+// So all keys of a table are checked. A violated rule among several keys is an error only if the table has no
+// other error.
 #pragma once
 
 #include <cstddef>
@@ -69,7 +69,7 @@ struct SceneSource {
 // A key or a value that is not supported yet.
 struct UnsupportedKey {
   std::string_view name;
-  std::string_view meanwhile;  // what to do until then
+  std::string_view meanwhile;  // an alternative for the user until then
 };
 
 // The length units that a person may name, in meters.

@@ -17,7 +17,7 @@ struct Tissue {
   double young_Pa = 0.0;
   double poisson = 0.0;
   bool measured = false;    // true: figures of this tissue; false: stand-ins, which `source` explains
-  std::string_view source;  // where the figures are from
+  std::string_view source;  // source of the figures
   glm::vec3 colour{0.0F};   // colour of the tissue in pictures; sRGB, 0 to 1
 };
 

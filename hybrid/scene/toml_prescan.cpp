@@ -133,8 +133,8 @@ std::size_t first_not_utf8(std::string_view text) {
   return text.size();
 }
 
-// Text that is not UTF-8 is taken for Latin-1 if it has no byte from 0x80 to 0x9F. In Latin-1 these bytes
-// stand for no letter or sign, but every byte from 0xA0 on does.
+// Text that is not UTF-8 is taken for Latin-1 if it has no byte from 0x80 to 0x9F. In Latin-1 these bytes are
+// control characters, and the bytes from 0xA0 on are letters and signs.
 [[noreturn]] void refuse_encoding(std::string_view text, std::size_t at, const std::filesystem::path& file) {
   const bool latin = std::all_of(text.begin(), text.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);

@@ -22,7 +22,7 @@ struct ParserGaveUp {};
 }  // namespace
 #undef NDEBUG
 #define TOML_ASSERT(expr) (static_cast<bool>(expr) ? static_cast<void>(0) : give_up())
-// Bounds the nesting of values; together with most_key_parts it keeps the recursion of parser, conversion and
+// Bounds the nesting of values. With most_key_parts, this keeps the recursion of parser, conversion and
 // destructors shallow enough for any stack.
 #define TOML_MAX_NESTED_VALUES 32
 #define TOML_HEADER_ONLY 1

@@ -43,8 +43,8 @@ std::size_t byte_at(std::string_view text, SourcePlace place);
 // The kind of a value for a message: "a string", "a table", ...
 std::string_view kind_in_words(TreeNode::Kind kind);
 
-// Text made safe to print on one line: characters that may not be printed, and bytes that are not UTF-8,
-// become '?', and text longer than `longest` bytes is cut.
+// Text made safe to print on one line. Characters that may not be printed, and bytes that are not UTF-8,
+// become '?'. Text longer than `longest` bytes is cut.
 std::string printable(std::string_view text, std::size_t longest = 200);
 
 // A name from the file for a message: printable, short, in 'quotes'.

@@ -23,13 +23,14 @@ struct BlackBoxRow {
   device::DeviceFault reported = device::DeviceFault::none;
   std::uint32_t faults = 0;     // all FaultBit flags of the session so far
   std::uint64_t nonfinite = 0;  // inputs and forces held back so far
-  float late_us = 0.0F;         // how late the machine woke the loop
+  float late_us = 0.0F;         // delay with which the machine woke the loop
   TickResult felt{};
 };
 
 // A ring of rows, allocated in the constructor. add() allocates nothing and never waits, so the servo thread
-// may call it. A fault is a device's or a tick's, or a number that is not finite. After the first fault the
-// ring takes rows for a quarter of its length and then stops, so it holds ticks before and after the fault.
+// may call it. A fault is one of the device, one of a tick, or a number that is not finite. After the first
+// fault the ring takes rows for a quarter of its length and then stops, so it holds ticks before and after
+// the fault.
 class BlackBox {
  public:
   static constexpr double kSeconds = 2.0;  // length of the kept record before a fault

@@ -33,7 +33,7 @@ std::vector<std::size_t> ticks_still(const ForceCourse& course, double dt_s) {
   return still;
 }
 
-// Ticks without motion from which on nothing is played slowly.
+// Number of ticks without motion after which ticks are no longer played slowly.
 std::size_t until_still(double dt_s) {
   return static_cast<std::size_t>(std::lround(kUntilStill_s / dt_s));
 }
@@ -101,7 +101,7 @@ class Errors {
   double longest_s_ = 0.0, beyond_s_ = 0.0;
 };
 
-// Replaces nested patches that are in use by wider ones, each object's once.
+// Replaces nested patches that are in use by wider ones, once for each object.
 void widen(WorldState& state, std::vector<bool>& wide) {
   for (std::size_t o = 0; o < state.soft.size(); ++o) {
     if (wide[o] || state.soft[o]->patches_in_use() == nullptr) continue;

@@ -15,8 +15,8 @@
 
 namespace hybrid {
 
-// Slow-down factors of the two references while the device moves. Where a lag falls with the slowness, or
-// with its root, the quick reference finds 0.89 or 0.81 of the error that the full one finds.
+// Slow-down factors of the two references while the device moves. If a lag is inversely proportional to the
+// factor, or to its root, the quick reference finds 0.89 or 0.81 of the error that the full one finds.
 inline constexpr int kQuickSlower = 5, kSlower = 10;
 // Below this speed the device counts as still: a tenth of a millimetre in 0.1 s.
 inline constexpr double kStill_m_per_s = 1e-3;
@@ -24,9 +24,10 @@ inline constexpr double kStill_m_per_s = 1e-3;
 // How carefully the reference is played.
 enum class Reference : std::uint8_t {
   // kQuickSlower times slower while the device moves, and kSlower times while it is still, until the
-  // reference comes to rest. It takes about twice as long as the session.
+  // reference comes to rest. The comparison takes about twice as long as the session.
   quick,
-  // kSlower times slower, with nested patches twice as wide. It takes 4 to 60 times as long as the session.
+  // kSlower times slower, with nested patches twice as wide. The comparison takes 4 to 60 times as long as
+  // the session.
   full,
 };
 
@@ -74,7 +75,7 @@ struct SlowRunOptions {
 // The options of a reference.
 [[nodiscard]] SlowRunOptions slow_run_options(Reference reference);
 
-// Plays `course` slowly from `state`, and compares every tick in which something soft is in contact: the slow
+// Plays `course` slowly from `state`, and compares every tick in which something soft is in contact. The slow
 // run passes all of them, so the worst instant cannot be missed. `state` must be a session that has just
 // begun at the device's first position.
 ForceError compare_with_slow_run(const World& world, WorldState& state, const ForceCourse& course,

@@ -67,7 +67,7 @@ bool has_partner(const std::vector<voxel::HeldVoxel>& held, std::uint32_t partne
 }
 
 // Adds the forces of anchors and rigid objects on a soft object whose contact is on patches. Patches know
-// only the forces of springs. So with links at their limits the balance has to confirm these forces.
+// only the forces of springs. If links are at their limits, these forces count only if they balance.
 void add_supports_of_patches(const World& world, const WorldState& state, std::uint32_t soft,
                              std::vector<PairForce>& out) {
   const voxel::SoftObject& object = *state.soft[soft];

@@ -22,8 +22,8 @@ struct ObjectPair {
 
 struct PairForce {
   ObjectPair pair;
-  // Force of the other object on the soft one (scene's frame). It is empty in three cases, in which the state
-  // does not determine it:
+  // Force of the other object on the soft one (scene's frame). Empty in three cases, in which the state does
+  // not determine the force:
   // - links at their limits tie both the other object and a third one to the same voxels;
   // - links at their limits carry loads, and the forces on the tissue do not balance;
   // - an object has rigid blocks.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A player's session on a thread of its own, while a window shows it. The session publishes snapshots and the
-// figures of every tick, and takes goals and edits. Neither waits for the other, but for changes and kept
-// states, for which the session stands still.
+// figures of every tick, and takes goals and edits. Neither waits for the other, with one exception: while a
+// change is made or a state is kept, the session stands still.
 #pragma once
 
 #include <atomic>
@@ -54,13 +54,13 @@ class LiveSession {
     }
     return ended_;
   }
-  // Does a change between two ticks, Player::change_scene() or go_back(). The session stands still meanwhile.
-  // Throws what `change` throws, and std::runtime_error if the session does not answer.
+  // Makes a change between two ticks: Player::change_scene() or go_back(). The session stands still
+  // meanwhile. Throws what `change` throws, and std::runtime_error if the session does not answer.
   template <class Change>
   void change(PlayRequest request, const Change& change) {
     if (!hold(request)) throw std::runtime_error("the session does not answer; try again");
     relaxation_.reset();
-    request.asked = nullptr;  // the points may belong to the scene before
+    request.asked = nullptr;  // the points may belong to the previous scene
     const auto go_on = [&] {
       relaxation_ = player_.relaxation_thread(1.0 / kSnapshotEvery_s);
       ask(request);
@@ -75,8 +75,8 @@ class LiveSession {
     for (int n = 0; n < kMostWaits && !ended_ && snapshots_.take().scene != player_.scene_number(); ++n)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  // Calls `act` between two ticks; the session stands still meanwhile. For what leaves the state as it is:
-  // Player::keep_state(), compare_with_rest(). Does nothing if the session does not answer.
+  // Calls `act` between two ticks; the session stands still meanwhile. For calls that do not change the
+  // state: Player::keep_state(), compare_with_rest(). Does nothing if the session does not answer.
   template <class Act>
   void between_ticks(const PlayRequest& request, const Act& act) {
     if (!hold(request)) return;

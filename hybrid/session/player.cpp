@@ -144,7 +144,7 @@ ChangeMade Player::change_scene(const Scene& scene, BuiltScene& built, const Dra
   if (!why_not.empty())
     throw std::runtime_error(why_not + ", so the scene cannot change while it is felt; change its file");
   if (changes_.size() == kMostChanges) throw std::runtime_error("the session has changed too often");
-  take_edits();  // those that wait belong to the old scene
+  take_edits();  // the waiting edits belong to the old scene
   const std::size_t voxels_before = voxels_of(*built_->state);
   if (!take_over(*built_->world, *built_->state, *built.world, built.state))
     throw std::runtime_error("the changed scene leaves the tool no free place; move the tool away first");
@@ -209,7 +209,7 @@ void Player::thin_out_kept() {
 void Player::go_back(std::size_t n) {
   if (n >= kept_.size()) throw std::runtime_error("that state is no longer kept");
   if (changes_.size() >= kMostChanges) throw std::runtime_error("the session has changed too often");
-  take_edits();  // those that wait are forgotten with the rest
+  take_edits();  // the waiting edits are forgotten too
   kept_.erase(kept_.begin() + static_cast<std::ptrdiff_t>(n) + 1, kept_.end());
   const KeptState& kept = kept_.back();
   built_->state = copy_state(*built_->world, *kept.state);

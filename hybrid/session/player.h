@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that a window steers: it takes requests and edits between ticks, hands every tick's figures over,
-// and keeps a recording of itself.
+// A session that a window steers. It takes requests and edits between ticks, hands over the figures of every
+// tick, and keeps a recording.
 #pragma once
 
 #include <atomic>
@@ -23,8 +23,8 @@ namespace hybrid {
 // that happens once is a counter.
 struct PlayRequest {
   bool dragging = false, paused = false;
-  // If not 0: pauses and takes no edit, so that the window's thread may read the state. Each pause has a
-  // number of its own, so that an earlier one is not taken for it.
+  // If not 0: pauses and takes no edit, so that the window's thread may read the state. Each pause has its
+  // own number, so that it is not confused with an earlier pause.
   std::uint32_t hold = 0;
   double speed = 1.0;              // simulated time over real time, 0 to 1; always 1 with a real device
   std::uint32_t restarts = 0;      // counts restarts of the hand's path
@@ -77,7 +77,7 @@ struct ChangeMade {
   std::unique_ptr<WorldState> after;
 };
 
-// The forces of two states at rest, at their own places of the device. Any thread may call it while the
+// The forces of two states at rest, each at its own position of the device. Any thread may call it while the
 // states stay as they are. Empty if `stop` became true.
 [[nodiscard]] std::optional<ComparedForces> compare_at_rest(const BuiltScene& before, const World& world,
                                                             const WorldState& after, double jnd_floor_N,
@@ -92,7 +92,7 @@ class Player {
   // Ticks whose figures may wait for a frame: eight seconds at 1 kHz.
   static constexpr std::size_t kSamples = 8192;
 
-  // States of the session that are kept to go back to: of the last minute, one a second, or as many as fit
+  // Kept states, to which the session can go back: one for each second of the last minute, or as many as fit
   // into this memory.
   static constexpr double kKept_s = 60.0, kKeepEvery_s = 1.0;
   static constexpr std::size_t kMostKeptBytes = std::size_t{512} << 20;
@@ -108,19 +108,20 @@ class Player {
   [[nodiscard]] std::unique_ptr<RelaxationThread> go_live(double surfaces_hz);
   void relax_at_once();
 
-  // The session goes on in another scene, which was made from `text` and built beside (take_over.h). Call it
-  // only while held, or without a servo loop, and without a relaxation thread of the old scene. Keeps
-  // references to the arguments; those of the old scene are no longer used, and keep the state before the
-  // change. Throws std::runtime_error if that is not possible; the session then goes on as it was. `words` of
-  // the result are left to the caller.
+  // The session goes on in another scene, which was made from `text` and built meanwhile (take_over.h). Call
+  // it only while the session is held or has no servo loop, after the old scene's relaxation thread has
+  // ended. Keeps references to the arguments. The old scene's arguments are no longer used, and hold the
+  // state before the change. Throws std::runtime_error if that is not possible; the session then goes on as
+  // it was. The caller sets `words` of the result.
   ChangeMade change_scene(const Scene& scene, BuiltScene& built, const DrawnScene& drawn,
                           const std::string& text);
-  // ---- going back; call these as change_scene() ----
+  // ---- going back; for these calls the conditions of change_scene() hold ----
   // Keeps the present state, if a second of the session has passed since the last one was kept. Nothing is
   // kept with a real device. States of an earlier scene are dropped.
   void keep_state();
   [[nodiscard]] bool keeps_now() const noexcept;
-  // The session goes on from kept state number `n`; what came after it is forgotten, by the recording too.
+  // The session goes on from kept state number `n`. Everything after that state is forgotten, in the
+  // recording too.
   void go_back(std::size_t n);
   // Kept states, the oldest first. Only the thread that keeps them may call these four.
   [[nodiscard]] const std::deque<KeptState>& kept() const noexcept { return kept_; }
@@ -131,9 +132,10 @@ class Player {
   }
   void snapshot_of(const KeptState& kept, Snapshot& out, const AskedPoints* asked = nullptr) const;
 
-  // ---- the force at rest, meanwhile (live_reference.h) ----
-  // Begins or ends it. Call it as change_scene(). It begins anew with each change of the scene and on the way
-  // back. Returns why it cannot begin, or nothing.
+  // ---- the force at rest while the session goes on (live_reference.h) ----
+  // Begins or ends the comparison with the force at rest, under the conditions of change_scene(). It begins
+  // anew with each change of the scene, and when the session goes back. Returns the reason if it cannot
+  // begin.
   std::string compare_with_rest(bool on);
   // The results; null if there is no comparison. Only the window's thread may call it.
   [[nodiscard]] ForcesAtRest* at_rest() noexcept { return reference_ ? &reference_->found() : nullptr; }
@@ -147,7 +149,7 @@ class Player {
   // Takes edits, and does one tick if one is due. Returns true if there was a tick.
   bool advance(const PlayRequest& request, const device::ServoInput& input) noexcept;
   [[nodiscard]] const TickResult& felt() const noexcept { return felt_; }
-  // Fills the snapshot of this moment, from within the servo loop. `asked`: as of PlayRequest.
+  // Fills the snapshot of this moment, from within the servo loop. `asked`: as in PlayRequest.
   void snapshot(Snapshot& out, const AskedPoints* asked = nullptr) const;
   // Were edits taken, or the scene changed, since the last snapshot? False while held.
   [[nodiscard]] bool edited() const noexcept { return edited_ && held() == 0; }

@@ -58,10 +58,11 @@ bool is_edit(const Edit& edit) {
 
 constexpr std::size_t kLongestPath = 4096;  // of a scene, in bytes; the system's PATH_MAX
 
-// Of a servo loop (unit: second): 1 MHz to 1 Hz, far beyond the rates that scenes and drivers have.
+// Periods of a servo loop (s): 1 MHz to 1 Hz, far beyond the rates that scenes and drivers have.
 constexpr double kLeastPeriod_s = 1e-6, kMostPeriod_s = 1.0;
 
-// Only values that save_recording() writes. Others would be replayed as something else.
+// Does the tick have only values that save_recording() writes? Other values would be replayed as something
+// else.
 bool is_tick(const Tick& tick) {
   return tick.fault <= static_cast<std::uint32_t>(device::DeviceFault::late) &&
          tick.work_share <= WorkShare::kMostSteps;
@@ -125,7 +126,7 @@ Scene scene_of_text(const Recording& recording, const std::string& text) {
   return scene;
 }
 
-// The scene of a recording. Throws std::runtime_error if its file is not as it was, and SceneError.
+// The scene of a recording. Throws std::runtime_error if its file has changed, and SceneError.
 Scene recorded_scene(const Recording& recording) {
   const std::filesystem::path& file = recording.scene_file;
   if (!file.has_filename()) return scene_of_text(recording, recording.scene_text);
@@ -136,8 +137,8 @@ Scene recorded_scene(const Recording& recording) {
                   printable(file.string(), kLongestPath)));
 }
 
-// The device of the recording may not be connected now, and may be another one than the scene's. Its force
-// limit says whether it was ideal: only an ideal device has none. The other devices differ in their limits
+// The device of the recording may not be connected now, and may differ from the scene's. Its force limit says
+// whether it was ideal, because only an ideal device has none. The other devices differ in their limits
 // alone.
 void use_recorded_device(Scene& scene, const device::DeviceLimits& limits) {
   scene.opened_limits = limits;
@@ -289,7 +290,7 @@ class ReplayedScene {
   }
   void take_change(const RecordedChange& change) {
     if (change.text.empty()) {
-      // The session was copied when the state was kept, and once more when it went back to it.
+      // The state was copied when it was kept, and copied again when the session went back to it.
       built_.state = copy_state(world(), *kept_copy(world(), state()));
       start_relaxation(state());
       return;
@@ -333,7 +334,7 @@ ReplayResult replay(const Recording& recording, const Progress& progress) {
     result.equal = false;
     result.first_difference = n;
   }
-  // A change after the last tick.
+  // Makes a change that follows the last tick.
   if (result.replayed_ticks == result.ticks) replayed.advance_to(result.ticks);
   result.state_hash = hash_state(hash, replayed.state());
   if (result.replayed_ticks == result.ticks)

@@ -12,8 +12,8 @@
 
 namespace hybrid {
 
-// Before this tick the session goes on in another scene (take_over.h), or from a copy of its own state, to
-// which it went back.
+// Before this tick the session changed to another scene (take_over.h), or went back to a copy of its own
+// state.
 struct RecordedChange {
   std::uint64_t tick = 0;
   std::uint64_t edits_before = 0;  // number of edits that were applied in the scenes before
@@ -41,8 +41,8 @@ Recording load_recording(const std::filesystem::path& file);
 
 struct ReplayResult {
   std::uint64_t ticks = 0, state_hash = 0;  // ticks of the recording; final hash of the replay
-  std::uint64_t replayed_ticks = 0;  // fewer than `ticks` where a signal ended the replay (StopOnSignal)
-  bool equal = false;                // are all replayed ticks equal to those recorded?
+  std::uint64_t replayed_ticks = 0;         // fewer than `ticks` if a signal ended the replay (StopOnSignal)
+  bool equal = false;                       // are all replayed ticks equal to those recorded?
   std::uint64_t first_difference =
       0;  // first tick whose hash differs; the number of ticks when only the final hash differs
 };

@@ -177,7 +177,8 @@ std::string safety_words(const BuiltScene& built) {
   return text;
 }
 
-// An object's force that is this many times the greatest felt force was opposed by another's, or limited.
+// If an object's force exceeds the greatest felt force by this factor, a limit or another object's force
+// reduced it.
 constexpr double kBeyondFelt = 1.01;
 constexpr std::array kPairKinds{"rigid", "soft", "anchors"};  // ObjectPair::Kind
 

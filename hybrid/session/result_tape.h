@@ -16,8 +16,8 @@ class ResultTape {
 
   // Call after each tick of a session that runs with Arrival::recorded.
   void keep(const AsyncRelaxation& async);
-  // Called by another thread in a session that runs with Arrival::played. Hands out the
-  // results of the states that were submitted since the last call.
+  // Hands out the results of the states that were submitted since the last call. For another thread of a
+  // session that runs with Arrival::played.
   void hand_out(AsyncRelaxation& async) noexcept;
   // Are the results that the next tick applies ready?
   [[nodiscard]] static bool ready(const AsyncRelaxation& async) noexcept;

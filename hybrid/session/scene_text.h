@@ -12,7 +12,7 @@
 namespace hybrid {
 
 struct ValueInScene {
-  std::string object;  // name of a rigid object; empty: of the tool
+  std::string object;  // name of a rigid object; empty: the tool
   EditedQuantity quantity = EditedQuantity::coupling_stiffness;
   double value = 0.0, in_scene = 0.0;  // SI units; value now, and value in the scene
 };

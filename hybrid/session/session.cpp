@@ -29,7 +29,7 @@ namespace {
 constexpr double kAfterPath_s = 0.5;         // a session goes on for this time after its path has ended
 constexpr double kWithHand_s = 60.0;         // a real device has no path that ends
 constexpr std::uint64_t kMomentEvery = 20;   // ticks between two candidates for the kept snapshot
-constexpr std::uint64_t kClearances = 1000;  // samples of the clearance in a session, about
+constexpr std::uint64_t kClearances = 1000;  // approximate number of samples of the clearance in a session
 
 std::uint64_t hash_in(std::uint64_t hash, std::uint64_t bits) noexcept {  // FNV-1a, eight bytes at a time
   return (hash ^ bits) * 0x100000001B3ULL;
@@ -380,7 +380,8 @@ void restore_tick_timing(const RecordedTick& tick, WorldState& state) noexcept {
 
 namespace {
 
-// Progress without StopAsked: a signal ends the comparison by itself, and the session before it must be kept.
+// A progress callback that does not throw StopAsked. A signal ends the comparison without it, and the session
+// before the comparison must be kept.
 Progress keep_going(const Progress& progress) {
   if (!progress) return {};
   return [&progress](const std::string& text) {

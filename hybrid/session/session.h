@@ -63,14 +63,14 @@ struct SessionOptions {
   // not throw.
   std::function<void(const Snapshot&)> on_frame{};
   // Compare the force of each tick in which something soft is in contact with that of a slow run
-  // (force_error.h), and how carefully that run is played. In real time nothing is compared.
+  // (force_error.h). `reference`: how carefully the slow run is played. In real time nothing is compared.
   bool measure_error = false;
   Reference reference = Reference::quick;
   // Clocks, counters and path begin as if this many ticks had passed, so that a soft start is over. The
   // forces do not depend on this number.
   std::uint64_t start_ticks = 0;
   Progress progress;
-  // Relax tissue away from the contact asynchronously. In real time a thread of its own does so.
+  // Relax tissue away from the contact asynchronously; in real time, on a separate thread.
   bool async_relaxation = false;
   bool relaxation_thread = true;  // false: submitted states are never relaxed; for benchmarks
   // How often the relaxation thread publishes surfaces for drawing.
@@ -106,10 +106,10 @@ struct SessionResult {
   std::vector<std::string> device_messages;  // events of the device, each with its remedy
   std::vector<std::string> path_notes;       // findings of the path's reader: gaps, repeated times
   std::string realtime_note;                 // the priority that was granted, in words
-  // How late the machine woke the loop. This is no part of the tick's time.
+  // Delay with which the machine woke the loop. It is no part of a tick's time.
   Percentiles late_us;
-  // CPU time of the ticks, and of asynchronous relaxation. In real time a relaxation thread takes the second
-  // one. Otherwise it is the time of the work that such a thread would have done.
+  // CPU time of the ticks, and of asynchronous relaxation. In real time a thread spends the time of
+  // relaxation. Otherwise it is the time of the work that such a thread would have done.
   double servo_s = 0.0, relaxation_s = 0.0;
   std::uint64_t async_results = 0;  // asynchronous results that ticks applied
   // Work budget of the contact in real time: the least share in any tick, and the number of ticks with less

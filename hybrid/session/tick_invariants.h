@@ -24,13 +24,13 @@ namespace hybrid {
 //     U' <= ½K|x' − q|² = U − F·(x' − x) + ½K|x' − x|²,
 // where F = K (q − x) is the force. So the work F·(x' − x) of the held force on the hand is at most the
 // stored energy plus ½K|Δx|² in each tick. The term ½K|Δx|² is the cost of holding a force for a tick
-// (Colgate & Schenkel 1997, K·T/2). An engine that adds no energy stays within the bound, stable or not: with
-// a coupling that is too stiff for the loop, this term alone can feed a buzz. With the clamp the same holds
-// for the energy of the clamped spring. A slew limit delays a change ΔF of the force and may give |ΔF|·|Δx|
-// more. This is added to the allowed energy, and is zero where the limit did not act. Tissue is not solved to
-// equilibrium within a tick. A wave may store energy in it that the hand has not paid for, and return it. So
-// with tissue, kTissueShare of moved_J() is allowed besides. That bounds this engine's error and is no
-// theorem.
+// (Colgate & Schenkel 1997, K·T/2). An engine that adds no energy stays within the bound, even if the loop is
+// not stable. With a coupling that is too stiff for the loop, this term alone can feed a buzz. With the clamp
+// the same holds for the energy of the clamped spring. A slew limit delays a change ΔF of the force and may
+// give |ΔF|·|Δx| more. This is added to the allowed energy, and is zero where the limit did not act. Tissue
+// is not solved to equilibrium within a tick. A wave may store energy in it that the hand has not paid for,
+// and return it. So with tissue, kTissueShare of moved_J() is allowed besides. This allowance is measured for
+// this engine, and is no theorem.
 //
 // outside. The proxy's centre is no nearer to a rigid object than the proxy's radius, within rounding.
 class TickInvariants {

@@ -43,7 +43,7 @@ class EdgeSplitter {
     return at->second;
   }
 
-  // One long edge gives two triangles, two give three, three give four.
+  // Splits a triangle with one, two or three long edges into two, three or four triangles.
   void split(const TriangleIndices& t, std::vector<TriangleIndices>& out) {
     const std::array<std::uint32_t, 3> m{middle(t[0], t[1]), middle(t[1], t[2]), middle(t[2], t[0])};
     const auto longs = std::count_if(m.begin(), m.end(), [](std::uint32_t v) { return v != kNone; });
@@ -52,7 +52,7 @@ class EdgeSplitter {
     } else if (longs == 3) {
       out.insert(out.end(), {{t[0], m[0], m[2]}, {m[0], t[1], m[1]}, {m[2], m[1], t[2]}, {m[0], m[1], m[2]}});
     } else {
-      // Turns the triangle so that its first edge is long, and of two long edges the second is long too.
+      // Numbers the edges so that the first is long. If two are long, the second is long too.
       std::size_t first = 0;
       while (m[first] == kNone || (longs == 2 && m[(first + 1) % 3] == kNone)) ++first;
       const std::size_t second = (first + 1) % 3, third = (first + 2) % 3;

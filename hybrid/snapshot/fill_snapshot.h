@@ -16,8 +16,8 @@ void fill_moved(const World& world, const WorldState& state, Snapshot& snapshot)
 // Like fill_moved(), but for use within a tick that must not wait. A soft object on nested patches gets only
 // the patches' nodes. A soft object under asynchronous relaxation gets only the neighbourhood of the tool.
 void fill_moved_near(const World& world, const WorldState& state, Snapshot& snapshot);
-// Fills the displacements at `asked`. `in_tick`: only of the objects that neither fill_moved_near()'s patches
-// nor the relaxation thread can answer for.
+// Fills the displacements at `asked`. `in_tick`: only for objects that get no displacements from the patches
+// of fill_moved_near() or from the relaxation thread.
 void fill_asked(const World& world, const WorldState& state, const AskedPoints& asked, bool in_tick,
                 Snapshot& snapshot);
 // Fills the present values of DrawnScene::editable. Allocates nothing once `values` has its size.

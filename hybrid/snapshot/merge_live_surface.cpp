@@ -105,7 +105,8 @@ void merge_live_surface(const DrawnScene& scene, const Snapshot& snapshot, const
     if (asked == nullptr || o >= asked->at_rest_m.size()) continue;
     const std::vector<glm::dvec3>& points = asked->at_rest_m[o];
     if (dented) lay_dent(shown.dents[o], points, shown.asked.moved_m[o]);
-    // All of one state, although it may be some ticks old: strain is made of differences.
+    // All displacements come from one state, even if it is some ticks old. Strain is computed from their
+    // differences.
     if (relaxed.asked.number == asked->number && has(relaxed.asked.moved_m, o, points.size()))
       shown.asked.moved_m[o] = relaxed.asked.moved_m[o];
   }

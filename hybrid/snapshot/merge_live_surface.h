@@ -8,8 +8,8 @@
 namespace hybrid {
 
 // Copies `snapshot` (filled by fill_moved_near()) to `shown`. Computes the displacements that the snapshot
-// lacks from its patches and dents and from `relaxed`, also at `asked`, which may be null. For the drawing
-// thread.
+// lacks, from its patches and dents and from `relaxed`. Does the same at the points `asked`, which may be
+// null. For the drawing thread.
 void merge_live_surface(const DrawnScene& scene, const Snapshot& snapshot, const RelaxedTissue& relaxed,
                         const AskedPoints* asked, Snapshot& shown);
 

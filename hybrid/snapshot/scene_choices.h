@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of a scene that need a new world: the model, energy and spacing of an object, Young's modulus of a
-// material, the place of an object. The world is built beside the session, which then goes on in it.
+// material, the place of an object. The new world is built while the session goes on. Then the session goes
+// on in the new world.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +17,9 @@ struct SceneChange {
   enum class Key : std::uint8_t {
     model,    // x: 1 as rigid, through the proxy; 0 by its voxels
     energy,   // x: 1 trilinear, 0 six-link
-    spacing,  // x: m, along the axis with the finest one; the ratios of the axes stay
+    spacing,  // x: the finest spacing of the three axes (m); their ratios stay
     young,    // x: Pa, of the material `name`
-    move,     // m, in the scene's frame: by how much the object is moved
+    move,     // displacement of the object in the scene's frame (m)
   };
   Key key = Key::model;
   std::string name{};
@@ -53,8 +54,8 @@ struct ObjectChoices {
 struct ModelComparison {
   std::string object{};
   std::vector<SceneChange> a{}, b{};
-  double depth_m = 0.0;    // by which the tool is pressed in
-  std::size_t places = 0;  // after which the comparison ends; 0: it goes on until the surface is covered
+  double depth_m = 0.0;    // to which the tool is pressed in
+  std::size_t places = 0;  // number of places that end the comparison; 0: it ends when the surface is covered
 };
 
 // Forces on the hand at one place before and after a change, with all tissue at rest.
@@ -62,7 +63,7 @@ struct ComparedForces {
   double before_N = 0.0, after_N = 0.0, difference_jnd = 0.0;
   bool at_rest = true;  // false: a force had not come to rest, and may be some percent off
 };
-// A change of a scene that was felt meanwhile; voxels of all soft objects.
+// A change of a scene while it was felt. `voxels_…`: of all soft objects.
 struct ChangeEffect {
   std::string words{};  // the change
   double t_s = 0.0;

@@ -128,7 +128,7 @@ struct AskedPoints {
   std::uint64_t number = 0;                        // sets with equal numbers have equal points
   std::vector<std::vector<glm::dvec3>> at_rest_m;  // [object] (scene frame); empty: none
 };
-// Their displacements (scene frame, m). An object without an answer is empty.
+// The displacements of AskedPoints (scene frame, m). An object without an answer is empty.
 struct AnsweredPoints {
   std::uint64_t number = 0;
   MovedSurfaces moved_m{};
@@ -146,15 +146,15 @@ struct PairPress {
   std::optional<double> force_N{};  // empty: not known
 };
 
-// The difference that a hand would feel between two models of an object, at each vertex of its surface: the
-// tool is pressed in there by one depth, and stands still until all tissue is at rest.
+// The difference that a hand would feel between two models of an object, at each vertex of its surface. The
+// tool is pressed in to the same depth at each vertex, and stands still until all tissue is at rest.
 struct FeltDifference {
-  std::uint64_t comparison = 0, number = 0;  // comparisons so far; rises with each new result
+  std::uint64_t comparison = 0, number = 0;  // number of the comparison; number of the result
   std::size_t object = 0;                    // of DrawnScene::objects
   std::vector<float> jnd{};                  // [vertex] NaN: not known, because the tool cannot come there
   std::size_t places = 0, pressed = 0;       // places that were tried; those with both forces
-  double gap_m = 0.0;                        // how far a vertex is at most from a place
-  double share_felt = 0.0;                   // of the known surface: more than 1 JND
+  double gap_m = 0.0;                        // greatest distance of a vertex from its nearest place
+  double share_felt = 0.0;                   // share of the known surface with more than 1 JND
   struct Most {                              // the place with the largest difference
     glm::dvec3 at_m{0.0};
     double jnd = 0.0, a_N = 0.0, b_N = 0.0;
@@ -162,7 +162,8 @@ struct FeltDifference {
 };
 
 struct Snapshot {
-  std::uint32_t scene = 0;  // number of changes of the scene before it; DrawnScene must be of the same scene
+  std::uint32_t scene =
+      0;  // number of earlier changes of the scene; the DrawnScene must be of the same scene
   std::uint64_t tick = 0;
   double t_s = 0.0;
   glm::dvec3 device_m{0.0}, proxy_m{0.0}, force_N{0.0};  // scene frame

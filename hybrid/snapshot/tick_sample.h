@@ -12,9 +12,8 @@
 
 namespace hybrid {
 
-// Parts of the force on the hand. Together they are the whole force: of rigid surfaces without friction and
-// damping, of tissue, of friction, of damping with texture; and the changes by the limits and by the
-// passivity controller.
+// Parts of the force on the hand; their sum is the whole force. rigid: without friction and damping. damping:
+// with texture. limits and passivity: changes by the limits and by the passivity controller.
 enum class ForcePart : std::uint8_t { rigid, soft, friction, damping, limits, passivity };
 inline constexpr std::size_t kForceParts = 6;
 
@@ -28,7 +27,7 @@ struct TickSample {
   float friction_N = 0.0F, damping_N = 0.0F, limits_N = 0.0F, passivity_N = 0.0F;
   // [ForcePart] along the direction that the force has before its limits.
   std::array<float, kForceParts> along_N{};
-  std::uint32_t contacts = 0;  // as of TickResult
+  std::uint32_t contacts = 0;  // as in TickResult
   float tick_us = 0.0F;
   std::array<float, kStages> stage_us{};
   bool late = false;  // the servo loop missed a period before this tick

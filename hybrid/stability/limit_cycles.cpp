@@ -51,8 +51,7 @@ class SmoothPress final : public device::Path {
 device::SimulatedDeviceOptions options_of(const LoopSetting& setting) {
   device::SimulatedDeviceOptions options;
   options.mechanism = setting.mechanism;
-  // The device reads the true position, and step() rounds it for the tick. The true motion is what the hand
-  // feels.
+  // The device reads the true position, and step() rounds it for the tick. The hand feels the true motion.
   options.mechanism.limits.resolution_m = 0.0;
   options.hand = setting.hand;
   options.hand.stiffness_N_per_m = held_loop(setting).hand_stiffness_N_per_m;

@@ -59,8 +59,8 @@ std::vector<DrivenMotion> motions(const PressedScene& scene, const LoopSetting& 
   const double deep = std::min(kDeepestPress_m, scene.press_N() / stiffness);
   std::vector<DrivenMotion> all;
   if (!(step > 0.0)) {
-    // The amplitude is small beside the depth, so that damping is not cut where it would pull. In a linear
-    // loop the phase matters only at Nyquist's frequency, at which a sine of phase 0 would stand still.
+    // The amplitude is small beside the depth, so that damping never pulls and is not cut. In a linear loop
+    // the phase matters only at Nyquist's frequency, at which a sine of phase 0 would stand still.
     for (int cycles = 1; cycles <= 64; ++cycles)
       all.push_back({.cycles = cycles, .centre_m = deep, .amplitude_m = 0.01 * deep, .phase_rad = 1.0});
     return all;

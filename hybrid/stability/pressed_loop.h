@@ -126,8 +126,8 @@ class HeldLoop {
 //   Linear loop (no friction, no encoder): the sign of the growth rate of the envelope decides, far from all
 //   limits. The bisection ends at 0.1 %. The softest stiffness is 20 N/m.
 //   Other loops: the tool must come to rest after the knock, at several presses within one encoder step.
-//   Stiffnesses are raised by factors of 1.3 until it does not; then a bisection ends at 0.5 %. The softest
-//   stiffness is 20 N/m, or that at which ten times the friction presses 2 mm deep if it is larger.
+//   Stiffnesses are raised by factors of 1.3 until the tool does not; then a bisection ends at 0.5 %. At the
+//   softest stiffness, at least 20 N/m, ten times the friction presses at most 2 mm deep.
 std::optional<double> measured_stable_stiffness(PressedScene& scene, const LoopSetting& setting);
 
 // Growth rate (1/s) of a knock's envelope in a linear loop. +infinity if it left the linear range, −infinity

@@ -93,7 +93,7 @@ class Plan {
   // soft tissue no coupling buzzes. The modulus is that of the first soft object; the other objects keep
   // their ratio to it.
   void soft() {
-    constexpr double kStiffCoupling_N_per_m = 20e3;  // buzzes on a rigid wall; on which tissue does it?
+    constexpr double kStiffCoupling_N_per_m = 20e3;  // buzzes on a rigid wall
     for (const double young : {1e3, 1e4, 1e5}) {
       for (const auto& [grip, name] : kGrips) {
         StabilityRow& row = add(StabilitySweep::tissue, Boundary::buzz, held_setting(model_, grip, 0));
@@ -217,7 +217,7 @@ class Plan {
 
 // The scene with all materials scaled by one factor, so that the first soft object's modulus is `young_Pa`.
 Scene with_young(Scene scene, double young_Pa) {
-  scene.materials.try_emplace("");  // what an object has that names none
+  scene.materials.try_emplace("");  // material of the objects that name none
   const double factor = young_Pa / scene.materials[scene.soft.front().material].young_Pa;
   for (auto& [name, material] : scene.materials) material.young_Pa *= factor;
   return scene;

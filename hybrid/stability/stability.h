@@ -75,9 +75,9 @@ struct StabilityOptions {
 };
 
 // Runs all measurements. For a rigid scene this is the whole plan (two to five minutes; quick: some seconds).
-// For a scene with soft objects only buzz is measured: the stiffness of the coupling at which it begins, at
-// moduli of 1, 10 and 100 kPa, and the modulus at which it begins under a stiff coupling. A signal
-// (StopOnSignal) ends the measurement early. Throws SceneError (see PressedScene).
+// For a scene with soft objects only buzz is measured. The results are the stiffness of the coupling at which
+// buzz begins, at moduli of 1, 10 and 100 kPa, and the modulus at which it begins under a stiff coupling. A
+// signal (StopOnSignal) ends the measurement early. Throws SceneError (see PressedScene).
 StabilityReport measure_stability(const Scene& scene, const StabilityOptions& options = {});
 
 // Comparison with theory: the number of rows that have a theory, and the largest error.

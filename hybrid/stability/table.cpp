@@ -39,7 +39,7 @@ nlohmann::ordered_json row_json(const StabilityRow& row) {
       {"lower_bound", or_null(row.lower_bound)},
       {"varied", title_of(row.sweep)}};
   if (row.young_Pa) j["young_Pa"] = *row.young_Pa;
-  j["unit"] = row.coupling_N_per_m ? "Pa" : "N/m";  // of what is measured
+  j["unit"] = row.coupling_N_per_m ? "Pa" : "N/m";  // unit of the measured figure
   if (row.kind == Boundary::buzz) {
     j["frequency_hz"] = row.measured ? nlohmann::ordered_json(row.vibration.frequency_hz) : nullptr;
     j["amplitude_m"] = row.measured ? nlohmann::ordered_json(row.vibration.amplitude_m) : nullptr;

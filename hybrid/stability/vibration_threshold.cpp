@@ -54,7 +54,7 @@ Vibration strongest_vibration(std::span<const double> motion_m, double rate_hz) 
     windowed[i] = away * (0.5 - 0.5 * std::cos(kTwoPi * share));
   }
   // With Hann's window, a sinusoid of amplitude a has |X|² = (a·n/4)² at its line and a quarter of that at
-  // each neighbour. The sum is 1.5 times the first, wherever between two lines the frequency lies (to 1 %).
+  // each neighbour. The sum is 1.5 times the first, within 1 %, also for a frequency between two lines.
   const double scale = 4.0 / (static_cast<double>(n) * std::sqrt(1.5));
   const auto last =
       std::min<std::size_t>(n / 2, static_cast<std::size_t>(1000.0 * static_cast<double>(n) / rate_hz));

@@ -148,8 +148,8 @@ void meshes(Cases& cases, SceneKind kind, bool quick) {
     cases.add(lines, motion, "no triangle with an area at all");
 }
 
-// A mixed scene is left out: carving 134 million voxels would take a quarter of an hour, and it shows nothing
-// new.
+// A mixed scene is left out: carving 134 million voxels would take a quarter of an hour and would show
+// nothing new.
 void large(Cases& cases, SceneKind kind) {
   if (kind == SceneKind::mixed) return;
   SceneSetting s;

@@ -20,7 +20,8 @@ namespace {
 // Number of jumps in a run, number of stays above and below the block, and ticks of each stay.
 constexpr int kJumps = 300, kThroughs = 30, kTicksThere = 5;
 constexpr double kFar = 1000.0;  // units; a metre if a unit is a millimetre
-// Ticks of the way out; tissue must rest for as many ticks afterwards. kMostRest: most ticks until then.
+// Ticks of the way out, and ticks for which tissue must then stay at rest. kMostRest: greatest number of
+// ticks until the end of that time.
 constexpr int kTicksOut = 100, kMostRest = 4000;
 constexpr std::uint64_t kLookEvery = 16;  // ticks between two measurements of the largest displacement
 constexpr double kAfterPath_s = 0.1;      // ticks go on for this time after the path has ended

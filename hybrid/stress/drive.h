@@ -18,8 +18,8 @@ enum class Motion : std::uint8_t {
   path,         // the scene's path: a hand, a device, a closed loop
   stalls,       // as `path`, but every 40th tick takes 1 to 100 ms, during which the force is held
   not_numbers,  // as `path`, but every 7th position is NaN, infinite, absurdly large, or denormal
-  jumps,        // no hand: each tick at another random place within 1,000 units of the middle
-  through,      // no hand: from above the block to 1,000 units below, or back, within one tick
+  jumps,        // no hand: in each tick the tool is at another random place within 1,000 units of the middle
+  through,      // no hand: the tool goes from above the block to 1,000 units below, or back, within one tick
 };
 inline constexpr std::array<Motion, 5> kMotions{Motion::path, Motion::stalls, Motion::not_numbers,
                                                 Motion::jumps, Motion::through};

@@ -128,7 +128,7 @@ class Suite {
   }
 
   // Is there enough free memory for the case? A test must not fill a machine that others use. A case that
-  // will be refused is run in any case.
+  // will be refused always runs.
   bool enough_memory() {
     const double free = static_cast<double>(available_memory_bytes());
     const double takes = static_cast<double>(soft_touched_bytes({512, 512, 512}));
@@ -228,8 +228,8 @@ class Suite {
         fmt::format("forces apart by {:.3g} N of {:.3g} at most", apart, r.most_N));
   }
 
-  // A scene of the user's own is judged only by what holds for any scene. Where this scene leaves the tool is
-  // unknown. How its objects move is unknown, too, unless `still`.
+  // A scene of the user's own is judged only by the oracles that hold for any scene. The tool's place at the
+  // end is unknown, and so is the motion of the objects unless `still`.
   void own_scene() {
     const Scene scene = load_scene(options_.scene);
     const bool still = std::none_of(scene.rigid.begin(), scene.rigid.end(), [](const RigidDescription& d) {

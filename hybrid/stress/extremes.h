@@ -25,12 +25,14 @@ struct ExtremeRow {
 //   finite   all numbers in force and state are finite
 //   limits   the force is within the device's limit, and its change within the slew limit
 //   energy   the hand gets back at most the stored energy and the cost of holding a force for a tick
-//   passive  with the controller on, the hand gets at most the energy that it gave and the largest of one
-//   tick outside  the tool is in no rigid object, and no nearer to one than its radius held     pulled a
-//   metre through an object within a tick, the tool stays on its side settled  after the tool has left, there
-//   is no force, and all tissue is back at rest same     the forces are those of the scene without the flaw,
-//   or near the origin hash     a second run gives the same bits time     no tick takes long refused  the
-//   message has file, line, column, the error and the remedy
+//   passive  with the controller on, the hand gets at most the energy that it gave, plus that of one tick
+//   outside  the tool is in no rigid object, and no nearer to one than its radius
+//   held     the tool stays on its side when it is pulled a metre through an object within a tick
+//   settled  after the tool has left, there is no force, and all tissue is back at rest
+//   same     the forces are those of the scene without the flaw, or near the origin
+//   hash     a second run gives the same bits
+//   time     no tick takes long
+//   refused  the message has file, line, column, the error and the remedy
 // TickInvariants defines finite, limits, energy and outside exactly.
 //
 // A coupling that is too stiff for the sampled loop buzzes. That is physics, and no row falls short for it.

@@ -25,9 +25,9 @@
 namespace hybrid {
 namespace {
 
-constexpr std::uint64_t kEpisode = 1000;         // ticks of random input before all is left to come to rest
-constexpr int kMostTicksToRest = 4000;           // ticks in which all has to come to rest
-constexpr std::size_t kMostFailures = 20;        // failures that are listed
+constexpr std::uint64_t kEpisode = 1000;   // ticks of random input, after which everything must come to rest
+constexpr int kMostTicksToRest = 4000;     // greatest number of ticks until everything is at rest
+constexpr std::size_t kMostFailures = 20;  // failures that are listed
 constexpr double kUnit_m = 1e-3, kJump_m = 1.0;  // unit of the scene; size of a jump
 // Depth in something rigid, and time of a tick, beyond which a failure is reported.
 constexpr double kMostInside_m = 1e-9, kLongFuzzTick_us = 1e6;
@@ -265,7 +265,7 @@ class Fuzz {
     if (watch_->over_slew_N() > 0.0) fail(fmt::format("{:.3g} N over the slew", watch_->over_slew_N()));
     if (watch_->slowest_us() > kLongFuzzTick_us)
       fail(fmt::format("a tick of {:.3g} ms", 1e-3 * watch_->slowest_us()));
-    const bool infeasible = (state_.faults & fault_infeasible) != 0;  // bodies close on the tool
+    const bool infeasible = (state_.faults & fault_infeasible) != 0;  // bodies leave no room for the tool
     if (watch_->inside_m() > kMostInside_m && !infeasible)
       fail(fmt::format("{:.3g} um inside something rigid", 1e6 * watch_->inside_m()));
     if (which_.still && watch_->excess_J() > watch_->tolerance_J())

@@ -18,9 +18,9 @@ struct FuzzOptions {
   Progress progress{};
 };
 
-// Result of one scene. There are rigid, soft and mixed scenes as in the extremes suite; one whose rigid
-// objects move, turn, are pushed, have friction and are textured; and two soft blocks that meet under a
-// punch.
+// Result of one scene. There are rigid, soft and mixed scenes as in the extremes suite. In a further scene
+// rigid objects move, turn, are pushed, have friction and are textured. In the last one two soft blocks meet
+// under a punch.
 struct FuzzResult {
   std::string scene;
   // `nonfinite`: inputs that were held back.

@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Record = nlohmann::json;
 
-// Changes when a file of the path is replaced or edited.
+// A text that changes when the file, or a file in the folder, is replaced or edited.
 std::string version_of(const fs::path& path) {
   if (path.empty()) return "none";
   std::uintmax_t bytes = 0;
@@ -46,7 +46,7 @@ std::string version_of(const fs::path& path) {
                      newest.time_since_epoch().count());
 }
 
-// All on which the composed scene depends.
+// Everything on which the composed scene depends.
 std::string composed_from(const ScanPair& pair, const ComposeOptions& common) {
   Record key{{"scan", version_of(pair.scan)},
              {"labels", version_of(pair.labels)},

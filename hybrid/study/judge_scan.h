@@ -19,12 +19,12 @@ namespace hybrid {
 struct StudyOptions {
   std::vector<ScanPair> scans{};
   std::filesystem::path out{};  // a folder for each scan, by its name
-  // All scans are composed with its names, rigid, soft, range and spacing_m. Its other members are not used.
+  // Its members names, rigid, soft, range and spacing_m hold for all scans. Its other members are not used.
   ComposeOptions compose{};
   double error_jnd = 1.0;
   std::optional<double> budget_us{};  // limit for the p99.9 of the tick; default: kBudgetShare of the period
   bool tune = false;                  // also choose settings for each scene
-  bool quick = false;                 // of `tune`
+  bool quick = false;                 // the shorter search of tune()
   Progress progress{};
 };
 
@@ -33,7 +33,7 @@ struct SessionFigures {
   std::uint64_t ticks = 0, contact_ticks = 0;
   double seconds = 0.0;  // of the session
   Percentiles tick_us{};
-  std::string not_measured{};  // why there is no error: nothing soft was felt; empty if there is one
+  std::string not_measured{};  // why the error is not known, as nothing soft was felt; empty if it is known
   double p99_jnd = 0.0, moving_max_jnd = 0.0, still_max_jnd = 0.0;
   std::string worst_near{};  // the press nearest to the place of the largest error
   double max_force_N = 0.0;
@@ -41,7 +41,7 @@ struct SessionFigures {
 
 // The choice of tune(); error and time as in TunedSetting.
 struct TunedScan {
-  std::string not_tuned{};  // why there is none; empty if there is one
+  std::string not_tuned{};  // why there is no choice; empty if there is one
   std::string verdict{}, words{};
   bool accurate_in_time = false;  // ChoiceRule::cheapest_accurate
   double error_jnd = 0.0, p999_us = 0.0;
@@ -65,8 +65,8 @@ struct JudgedScan {
 
 // Composes a scene from the scan, plays it, and judges it. The scan's folder has the scene (scene/), the
 // record of its composition (compose.json) and finished parts (cache/). A scene is composed again only if its
-// files or options changed, and played again only if it or the program changed. A scene that was edited since
-// is judged as it is. Any error but a signal is a result with `failed`.
+// files or options changed, and played again only if the scene or the program changed. A scene that was
+// edited since is judged as it is. Any error but a signal is a result with `failed`.
 JudgedScan judge_scan(const ScanPair& pair, const StudyOptions& options);
 
 }  // namespace hybrid

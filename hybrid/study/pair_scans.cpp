@@ -102,7 +102,7 @@ void name_them(std::vector<ScanPair>& pairs) {
   }
 }
 
-// Index of the scan to which the labels belong by their name; empty: to none, or to several with one name.
+// Indices of the scans to which the labels belong by their name. Several scans may have the same name.
 std::vector<std::size_t> scans_by_name(const std::vector<fs::path>& scans, const fs::path& labels) {
   const std::string label_stem = stem_of_volume(labels);
   std::vector<std::size_t> best;
@@ -135,7 +135,7 @@ std::vector<std::vector<fs::path>> labels_of_scans(const std::vector<fs::path>& 
     const fs::path folder = folder_of(file);
     const bool alone = scans_in[folder] == 1 && labels_in[folder] == 1;
     std::vector<std::size_t> found = scans_by_name(scans, file);
-    // Scans of one name, each in a folder of its own: the labels beside the scan belong to it.
+    // If several scans have the same name, the labels belong to the scan in the same folder.
     std::erase_if(found, [&](std::size_t n) { return found.size() > 1 && folder_of(scans[n]) != folder; });
     if (found.size() != 1 && alone) {
       found.clear();

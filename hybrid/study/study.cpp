@@ -21,7 +21,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// How far the worse of error and tick is beyond its bound, as a ratio. Failed scans are worst.
+// The larger of two ratios: error to its bound, and tick to its bound. Infinite for a failed scan.
 double badness(const JudgedScan& scan) {
   if (!scan.failed.empty()) return std::numeric_limits<double>::infinity();
   const double ratio = std::max(scan.session.p99_jnd / scan.bounds.error_jnd,

@@ -10,8 +10,8 @@
 
 namespace hybrid {
 
-// The result of a scan: "good", "error felt", "too slow", both of them, "fault", "failed". Without an error,
-// as nothing soft was felt, ", nothing soft felt" follows.
+// The result of a scan: "good", "error felt", "too slow", both of them, "fault", "failed". If the error is
+// not known because nothing soft was felt, ", nothing soft felt" follows.
 std::string scan_verdict(const JudgedScan& scan);
 // The scan with its figures in one line, without a line break.
 std::string scan_words(const JudgedScan& scan);

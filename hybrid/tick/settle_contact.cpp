@@ -43,9 +43,9 @@ glm::dvec3 pull_on_proxy(const World& world, const WorldState& state, const glm:
 // The tissue's model is the stiffness of the voxels that are pressed now. The true stiffness is larger when a
 // chain tightens as the proxy moves, or when the tool meets further voxels. Steps by the model alone could
 // then alternate between two places without end. If a step overshoots (the pull changes sign), the secant
-// stiffness is learnt: with it the step would have ended at zero pull. It decays over the next passes.
-// Nothing is learnt from other steps: over a short step, tissue that relaxes meanwhile looks arbitrarily
-// stiff.
+// stiffness is learnt: with it the step would have ended at zero pull. The learnt stiffness decays over the
+// next passes. Nothing is learnt from other steps: over a short step, tissue that relaxes meanwhile looks
+// arbitrarily stiff.
 void learn_stiffness(const World& world, WorldState& state, const glm::dvec3& delta, const glm::dvec3& before,
                      const glm::dvec3& after, const glm::dmat3& model, const glm::dmat3& used) noexcept {
   state.learnt_stiffness_N_per_m *= kSettings.kept;
@@ -69,7 +69,7 @@ struct OutsideRigid {
 
 // The point nearest to `target` in the metric, outside rigid objects near the proxy and outside the planes
 // that add_others() appends to scratch.planes. Rigid planes are searched up to a radius around the proxy. If
-// the point found is nearer to the proxy than that, no plane that was missed can change it.
+// the point found is nearer to the proxy than this radius, no plane that was missed can change it.
 template <class AddOthers>
 OutsideRigid minimise_outside_rigid(const World& world, WorldState& state, const glm::dvec3& target,
                                     const polygon::Metric& metric, AddOthers&& add_others) noexcept {
@@ -92,7 +92,7 @@ void add_stop(WorldState& state, const polygon::ContactPlane& plane) noexcept {
 }
 
 // Tissue that cannot leave the tool's way is as good as rigid, and the proxy stops there. A tool that is
-// pressed further in every pass and taken back at the end of the tick would act as a wedge: it would drive
+// pressed further in every pass and taken back at the end of the tick would act as a wedge. It would drive
 // voxels aside and gain energy. Once a tick the planes recede by `probe`, to find out whether the voxels
 // still cannot leave.
 glm::dvec3 stop_at_jammed(const World& world, WorldState& state, const glm::dvec3& target,
@@ -208,8 +208,8 @@ void give_way(const World& world, WorldState& state, const glm::dvec3& before, S
         bounds = tool_bounds(world, state, state.proxy_m, false, kSettings.soft_step, state.scratch.planes);
       });
   // Notes the planes that stop the tool. Then moves the tool to the place found. If that place is not surely
-  // outside everything rigid, moves the tool back to its place at the start of the tick, unless it was deeper
-  // there.
+  // outside everything rigid, moves the tool back to its place at the start of the tick. The tool stays if it
+  // was deeper there.
   for (std::size_t i = least.rigid; i < state.scratch.planes.size(); ++i) {
     if (state.scratch.planes[i].offset > glm::dot(state.scratch.planes[i].normal, state.proxy_m))
       add_stop(state, state.scratch.planes[i]);

@@ -14,7 +14,8 @@
 namespace hybrid {
 namespace {
 
-// The tool is pressed in for so many ticks at most; a comparison of forces gets more.
+// Greatest number of ticks in which the tool is pressed in: for a session that goes on; for a comparison of
+// forces.
 constexpr int kMostPressing = 400, kMostResting = 1500;
 // The force is steady if it changes by no more than this over kSteadyTicks, which are two relaxations of all
 // tissue.
@@ -28,7 +29,7 @@ std::size_t number_of(const Objects& objects, const std::string& name) {
   return static_cast<std::size_t>(at - objects.begin());
 }
 
-// Values of objects that are no longer of their kind, soft or rigid, are dropped.
+// Takes over edited values. Those of an object that changed from soft to rigid, or back, are dropped.
 void take_edited_values(const World& before_world, const WorldState& before, const World& world,
                         WorldState& state) {
   state.edited.coupling_N_per_m = before.edited.coupling_N_per_m;

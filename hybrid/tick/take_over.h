@@ -12,22 +12,22 @@
 
 namespace hybrid {
 
-// Why no session can go from one of these worlds to the other, in words; empty: it can. Moving bodies would
-// have to carry on their motion in tissue that begins at rest.
+// The reason why no session can go from one of these worlds to the other, in words; empty: it can. No object
+// may move, because its motion would go on in tissue that begins at rest.
 [[nodiscard]] std::string why_no_take_over(const World& before, const World& after);
 
-// `state` is at rest in `world` and goes on where `before` is. Clock, force limits, passivity and edited
-// values go on; values of an object go to the object of the same name. Tissue begins at rest. The tool is put
-// outside everything, and is then pressed in by ticks that count for nothing, with the device at its present
-// place, until the force is steady. The same arguments give the same state, bit by bit. Allocates. Returns
-// false if there is no free place for the tool; `state` is useless then.
+// `state`, which is at rest in `world`, continues the session of `before`. Clock, force limits, passivity and
+// edited values go on; values of an object go to the object of the same name. Tissue begins at rest. The tool
+// is put outside everything, and is then pressed in with the device at its present place until the force is
+// steady. The ticks of this press do not count. The same arguments give the same state, bit by bit.
+// Allocates. Returns false if there is no free place for the tool; `state` is useless then.
 [[nodiscard]] bool take_over(const World& before_world, const WorldState& before, const World& world,
                              std::unique_ptr<WorldState>& state);
 
 // The force at the device's present place when all tissue is at rest. Rigid objects must not move.
 struct RestForce {
   glm::dvec3 force_N{0.0};
-  bool steady = false;  // false: it still changed by more than 0.2 % in a tenth of a second
+  bool steady = false;  // false: the force still changed by more than 0.2 % in a tenth of a second
   bool tissue = false;  // the tool presses tissue
 };
 // Any thread may call it while the state stays as it is. Ends early, with a force that is not steady, once

@@ -84,7 +84,7 @@ class StageClock {
 
  private:
   static constexpr double kShort_us = 10.0;  // longest wall time that is taken as CPU time
-  // A reading serves so many ticks: pre-emptions too short to notice must not add up.
+  // Greatest number of ticks for one reading, so that pre-emptions too short to notice do not add up.
   static constexpr int kTicksPerReading = 256;
 
   void read() noexcept {
@@ -122,8 +122,8 @@ double check_time(double dt_s) noexcept {
 // objects on nested patches for contact.
 Neighbourhood broad_phase(const World& world, WorldState& state, const glm::dvec3& device) noexcept {
   Neighbourhood around{.range_m = contact_range_m(world, state)};
-  // The map holds an object that is pressed on nested patches in its rest state, so the map cannot decide
-  // that the way is free.
+  // If an object is pressed on nested patches, the map has it in its rest state. So the map cannot decide
+  // whether the way is free.
   around.free = !contact_on_patches(state) &&
                 advance_through_free_space(world, state, device, soft_reach(world, state));
   if (around.free) state.active_count = 0;

@@ -14,7 +14,7 @@ namespace hybrid {
 // after arbitration.
 enum class Stage : std::uint8_t {
   bodies,       // bodies move, and carry or push the proxy
-  broad_phase,  // finds what the occupancy map has around the proxy
+  broad_phase,  // finds the contents of the occupancy map around the proxy
   contact,      // bodies press tissue; proxy, rigid planes and tissue reach their minimum together
   background,   // tissue away from the contact relaxes towards its equilibrium
   arbitration,  // soft objects, tool and bodies give way to one another

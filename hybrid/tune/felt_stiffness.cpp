@@ -8,8 +8,8 @@
 namespace hybrid {
 namespace {
 
-constexpr double kGap_s = 0.02;           // loss of contact that a hand feels as the same contact
-constexpr std::size_t kFewestTicks = 10;  // of a slope
+constexpr double kGap_s = 0.02;           // a shorter loss of contact does not end the contact for a hand
+constexpr std::size_t kFewestTicks = 10;  // least number of ticks for a slope
 
 }  // namespace
 

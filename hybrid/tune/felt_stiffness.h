@@ -11,8 +11,9 @@
 
 namespace hybrid {
 
-// Just noticeable differences of the compliance, as shares. With the finger on the surface 15 %; through a
-// rigid tool more than three times as much (Bergmann Tiest & Kappers, IEEE Trans. Haptics 2(4):189, 2009).
+// Just noticeable differences of the compliance, as shares. With the finger on the surface it is 15 %, and
+// through a rigid tool more than three times as much (Bergmann Tiest & Kappers, IEEE Trans. Haptics 2(4):189,
+// 2009).
 inline constexpr double kStiffnessJndFinger = 0.15, kStiffnessJndTool = 0.45;
 // Smallest angle between two forces that a hand notices by touch alone (Barbagli, Salisbury, Ho, Spence &
 // Tan, ACM Trans. Applied Perception 3(2), 2006). With vision of the contact it is 18.4 degrees.
@@ -27,14 +28,14 @@ struct TickRange {
 // 20 ms belong to it. Empty if there is none.
 std::optional<TickRange> first_contact(const ForceCourse& course, double floor_N, double dt_s);
 
-// Slope of the force's size over the depth (N/m) while the tool goes deeper for the first time: least squares
-// over the ticks of the contact that are deeper than all before. `depth_m` has an entry for each tick. Empty:
-// there are fewer than ten such ticks, or their depth does not change.
+// Slope of the force's size over the depth (N/m) while the tool goes deeper for the first time. It is fitted
+// by least squares to the ticks of the contact that are deeper than all before. `depth_m` has an entry for
+// each tick. Empty: there are fewer than ten such ticks, or their depth does not change.
 std::optional<double> felt_stiffness(const ForceCourse& course, const std::vector<double>& depth_m,
                                      const TickRange& contact);
 
 // The stiffness K for which a proxy's force is nearest to a reference. The path of the proxy on a rigid
-// surface does not depend on K, so its force is proportional to K, and the least squares have a closed form.
+// surface does not depend on K. So the force is proportional to K, and the least squares have a closed form.
 struct StiffnessMatch {
   double stiffness_N_per_m = 0.0;
   double rms_N = 0.0, max_N = 0.0;  // of the difference that the fit leaves

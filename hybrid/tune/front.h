@@ -37,8 +37,8 @@ struct Bounds {
 // The rule that decided.
 enum class ChoiceRule : unsigned char {
   cheapest_accurate,      // the cheapest of those under the error's bound and within the budget
-  most_accurate_in_time,  // there are none such: the most accurate within the budget
-  cheapest,               // none is within the budget: the cheapest of all
+  most_accurate_in_time,  // if there are none: the most accurate within the budget
+  cheapest,               // if none is within the budget: the cheapest of all
 };
 
 struct Choice {

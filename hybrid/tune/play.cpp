@@ -19,11 +19,12 @@ namespace hybrid {
 namespace {
 
 constexpr double kAfterMotion_s = 0.5;  // a session goes on after its path, so that tissue comes to rest
-// Time before and after a contact in which a reference that comes to rest may have one, too.
+// A reference at rest may be in contact for up to this time before and after a contact of the session.
 constexpr double kAround_s = 0.02;
 constexpr std::size_t kReportEvery = 64;  // ticks
-// A pose is held for rounds of ticks; in each the whole object is relaxed once. At least twice kFewestRounds,
-// then twice as many again and again, until this changes the force by less than kAtRest_jnd.
+// A pose is held for rounds of ticks. In each round the whole object is relaxed once. The number of rounds
+// begins with kFewestRounds. It is doubled until a doubling changes the force by less than kAtRest_jnd, or
+// until it reaches kMostRounds.
 constexpr int kTicksOfRound = kTicksBetweenAtOnce, kFewestRounds = 2, kMostRounds = 64;
 constexpr double kAtRest_jnd = 0.1;
 
@@ -226,7 +227,7 @@ class RestPlayer {
   double floor_N_;
   glm::dvec3 device_m_{0.0};
   TickResult felt_{};
-  glm::dvec3 halfway_N_{0.0};  // of the last pose, after half of its hold
+  glm::dvec3 halfway_N_{0.0};  // force in the last pose after half of its hold
 };
 
 }  // namespace

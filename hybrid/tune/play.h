@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Plays a scene with one setting along a motion, at normal speed (forces, times of ticks, size) or from pose
-// to pose, with tissue at rest in each (forces for the truth).
+// Plays a scene with one setting along a motion. A session at normal speed gives forces, times of ticks and
+// size. A session from pose to pose, with tissue at rest in each, gives the forces of the truth.
 #pragma once
 
 #include <cstdint>
@@ -41,16 +41,17 @@ struct Poses {
   std::vector<bool> near;   // near a contact
   std::vector<bool> stops;  // the first tick of a stop, after which all stay at rest
 };
-// Poses of a motion that a session felt as `course`: of the ticks near a contact in which something moves at
-// most `most`, evenly spread, and the stops there. `bodies_move`: rigid bodies move even if the device does
-// not, so that there are no stops.
+// Poses of a motion that a session felt as `course`. They are at most `most` ticks near a contact in which
+// something moves, evenly spread, and the stops near a contact. `bodies_move`: rigid bodies move even if the
+// device does not, so that there are no stops.
 Poses poses_along(const ForceCourse& course, double dt_s, bool bodies_move, int most);
-// Every `n`-th of them, and all stops.
+// Every `n`-th pose in motion, and all stops.
 Poses every_nth(const Poses& poses, std::size_t n);
 
 // Forces of tissue at rest.
 struct RestCourse {
-  // at_rest is false in ticks with contact or near one that are not held: there tissue lags behind the tool.
+  // at_rest is false in ticks in or near contact that are not held, because tissue lags behind the tool
+  // there.
   ForceCourse course;
   // The same after half of the time that each pose was held.
   ForceCourse halfway;
@@ -58,7 +59,7 @@ struct RestCourse {
 };
 
 // Plays a motion and stops it in each pose, until tissue is at rest; bodies do not move meanwhile. Where one
-// of the objects is felt, the device moves `slower` times slower between them.
+// of the objects is felt, the device moves `slower` times slower between the poses.
 RestCourse play_to_rest(const Scene& scene, const std::vector<std::string>& objects, const Motion& motion,
                         const Poses& poses, int slower, const Progress& progress);
 

@@ -19,9 +19,10 @@ using Key = SceneChange::Key;
 
 // Spacings that are offered (unit: the present one). A finer one costs up to eight times as much.
 constexpr std::array kSpacingFactors{0.5, 2.0 / 3.0, 1.5, 2.0};
-constexpr int kWrittenDigits = 6;  // of a number in the text: far finer than a hand can tell
+constexpr int kWrittenDigits = 6;  // digits of a number in the text: far finer than a hand can tell
 
-// Objects that the scene wants as rigid are among them: they have voxels to go back to.
+// The objects that may be changed. They include objects that the scene renders as rigid, because these have
+// voxels to return to.
 std::vector<TunableObject> changeable_objects(const Scene& as_read) {
   Scene as_voxels = as_read;
   std::set<std::string> rigid;

@@ -10,7 +10,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kSideways = 0.5;        // radii of the tool by which a motion is moved
-constexpr double kStaysInContact = 0.5;  // share of the contact that it must keep
+constexpr double kStaysInContact = 0.5;  // share of the contact that a moved motion must keep
 
 }  // namespace
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The motions on which settings are compared: the scene's path, and the same path moved sideways. A coarse
-// lattice may suit one path by luck. Half a tool aside it meets other voxels, and a hand would call it the
-// same touch.
+// lattice may suit one path by luck. A path that is moved aside by half of the tool's radius meets other
+// voxels, but for a hand it is the same touch.
 #pragma once
 
 #include <cstddef>

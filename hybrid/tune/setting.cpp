@@ -15,7 +15,7 @@
 namespace hybrid {
 namespace {
 
-// Along an edge of a formula, so that one layer can be held and one can move.
+// Least number of voxels along an edge of a formula, so that one layer can be held and one can move.
 constexpr double kFewestVoxels = 2.0;
 
 double rounded(double value, int digits = kSpacingDigits) {

@@ -20,8 +20,9 @@ struct ObjectSetting {
   // 0: the file gives no spacing, and none is written.
   glm::dvec3 spacing{0.0};
   Energy energy = Energy::six_link;
-  double work = 1.0;         // share of the work at the contact that a tick does
-  int patch = kPatchMargin;  // width of the finest nested patch; of no effect voxel by voxel
+  double work = 1.0;  // share of the work at the contact that a tick does
+  int patch =
+      kPatchMargin;  // width of the finest nested patch; no effect if the object is kept voxel by voxel
 
   friend bool operator==(const ObjectSetting& a, const ObjectSetting& b) {
     return a.object == b.object && a.proxy == b.proxy && a.spacing == b.spacing && a.energy == b.energy &&

@@ -7,11 +7,12 @@
 namespace hybrid {
 namespace {
 
-// Spacings of the sweep, as multiples of the scene's own: the truth has the scene's voxels, and finer ones
-// would answer another question.
+// Spacings of the sweep, as multiples of the scene's own. Finer voxels are not tried, because the truth has
+// the scene's voxels.
 constexpr std::array kScales{1.0, 1.125, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0};
 constexpr std::array kQuickScales{1.0, 1.25, 1.5, 2.0, 3.0, 5.0};  // factors with --quick
-// Shares of the work in a tick that are tried. On nested patches all below 2/3 are one axis in turns.
+// Shares of the work in a tick that are tried. On nested patches every share below 2/3 is the same: one axis
+// a tick, in turns.
 constexpr std::array kLessWork{0.5, 0.25};
 constexpr double kStep = 1.5;  // factor on the spacing of one object while the others stay
 

@@ -13,19 +13,22 @@ namespace hybrid {
 namespace {
 
 // Orders of the errors. Spacing: the edge of a contact is known to one spacing, an error of first order for
-// either energy. Rest: the least order at which the force was seen to approach rest with the time of a hold.
+// either energy. Rest: the least measured order at which the force approaches rest with the time of a hold.
 constexpr double kSpacingOrder = 1.0, kRestOrder = 0.6;
-// Poses of the truth in which the device moves, so that their p99 is not a single one of them.
+// Numbers of poses of the truth in which the device moves, large enough that p99 is not decided by a single
+// pose.
 constexpr int kPoses = 128, kQuickPoses = 64;
-// Of these, every so many are also taken on other voxels.
+// Every kPosesApart-th of these poses is also taken on other voxels.
 constexpr int kPosesApart = 6;
-// Factors by which the device is slower between the poses. Where it stays in a pose longer than it moves, its
-// speed matters little, so that the large lattices of other voxels move faster.
+// Factors by which the device is slower between poses: of the truth, and on other voxels. The speed matters
+// little if the device rests in poses longer than it moves. So it is less slow on the large lattices of other
+// voxels.
 constexpr int kSlowerBetween = 10, kSlowerApart = 2;
 constexpr double kMostVoxels = 4e6;   // voxels are not divided if there would be more
 constexpr double kPoseWeight = 0.25;  // cost of a pose, if that of a session at the same spacing is 1
 constexpr double kSlowPlays = 0.4;    // assumed share of a path in contact
-// Exponents of 1/scale. Of a session less than 3, because mainly the voxels near the contact cost time.
+// Exponents of 1/scale in the cost of a session and of a pose. The first is below 3, because mainly the
+// voxels near the contact cost time.
 constexpr double kWeightPower = 1.5, kPosePower = 3.0;
 
 nlohmann::json course_json(const RestCourse& played) {
@@ -130,7 +133,8 @@ Poses find_poses(const TruthPlan& plan, const Motion& motion, const Progress& pr
                      poses_of(plan));
 }
 
-// The course on this grid, from the cache if it is there. `at`: finds the poses; `count`: about so many.
+// The course on this grid, from the cache if it is there. `at`: finds the poses. `count`: their approximate
+// number.
 RestCourse course_on(const TruthPlan& plan, const TruthGrid& grid, const Motion& motion,
                      const std::string& motion_words, int count, int slower,
                      const std::function<Poses(const Progress&)>& at, const EvaluationCache& cache,
@@ -160,7 +164,7 @@ SettingError difference(const TruthPlan& plan, const ForceCourse& course, ForceC
   return felt_error(course, reference, plan.floor_N, plan.dt_s);
 }
 
-// May the voxels be divided? If not, the reason.
+// The reason why the voxels cannot be divided; empty: they can.
 std::string too_many_voxels(const TruthPlan& plan) {
   const BuiltScene built = build_scene(as_reference(plan.as_read, own_setting(plan.objects)));
   double voxels = 0.0;
@@ -204,8 +208,8 @@ Truth measure_truth(const TruthPlan& plan, const Motion& motion, const Evaluatio
         .course;
   };
   const ForceCourse divided = apart({truth.grid.setting, kTruthSplit});
-  // The error of the better of two is their difference if they are of first order, that of the scene's own
-  // voxels twice as much.
+  // At first order, the error of the voxels that are divided in two is the difference of both runs. The error
+  // of the scene's own voxels is twice as large.
   const SettingError finer = richardson(difference(plan, truth.course, divided), kTruthSplit, kSpacingOrder);
   const double larger = std::pow(kTruthSplit, kSpacingOrder);
   truth.spacing = {times(finer.moving, larger), times(finer.still, larger)};

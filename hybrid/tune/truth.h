@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The truth with which settings are compared: the scene's own voxels with accurate energy and without
-// thinning, each tissue at rest under the tool, in poses along the motion. Its voxels are data: labels say
-// nothing about the inside of a voxel. So two questions are kept apart. How far is a setting from the scene?
-// That is the error of a setting, and the truth's own error is only that it is not quite at rest. And how far
-// is the scene from tissue that is divided more finely? That is a property of the scene, the same for all
-// settings.
+// thinning. In poses along the motion all tissue is at rest under the tool. The scene's voxels are data,
+// because labels say nothing about the inside of a voxel. So two differences are kept apart. The difference
+// of a setting from the scene is the error of the setting. The truth's own error is only that it is not quite
+// at rest. The difference of the scene from tissue that is divided more finely is a property of the scene,
+// and is the same for all settings.
 #pragma once
 
 #include <functional>
@@ -59,8 +59,8 @@ using Step = std::function<void(const std::string& words, double weight,
 RestCourse truth_course(const TruthPlan& plan, const Motion& motion, const std::string& motion_words,
                         const EvaluationCache& cache, const Step& step);
 
-// Measures the truth, its error (Richardson, from half of the time that each pose is held), and what the
-// scene's spacing and shapes are felt by, in fewer poses.
+// Measures the truth, and its error (Richardson, from half of the time that each pose is held). In fewer
+// poses it also measures the differences that come from the scene's spacing and shapes.
 Truth measure_truth(const TruthPlan& plan, const Motion& motion, const EvaluationCache& cache,
                     const Step& step);
 

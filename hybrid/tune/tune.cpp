@@ -23,7 +23,7 @@ constexpr double kFirstShare = 1.0 / 3.0;  // share of the contact that the firs
 constexpr double kMarginOfPart = 0.3, kMarginOfWhole = 0.1;
 // Timed sessions of each setting; odd, so that a median is one of them.
 constexpr std::size_t kPasses = 5, kQuickPasses = 3;
-constexpr double kOtherSpeed = 1.5;  // of the confirming motion
+constexpr double kOtherSpeed = 1.5;  // factor on the speed of the confirming motion
 
 // A setting under test, with the times of its ticks in each pass.
 struct Trial {
@@ -91,7 +91,7 @@ class Search {
     for (const Setting& setting : settings) plan_trial(setting);
   }
 
-  // Both rounds on both motions, and the timed passes.
+  // Plans both rounds on both motions, and the timed passes.
   void plan_trial(const Setting& setting) {
     progress_.plan(weight(setting) * (2.0 * kFirstShare + 1.0 + static_cast<double>(passes())));
   }
@@ -238,8 +238,8 @@ class Search {
     }
   }
 
-  // For each object that may be rendered by the proxy, and that the tool touches then: tries the proxy with a
-  // coupling that fits the truth's force in the first contact with the object.
+  // For each object that may be rendered by the proxy: tries the proxy with a coupling that fits the truth's
+  // force in the first contact with the object. An object that the tool does not touch then is left out.
   void match_proxies() {
     std::vector<Setting> settings;
     for (std::size_t n = 0; n < result_.objects.size(); ++n) {
@@ -275,10 +275,10 @@ class Search {
     return match;
   }
 
-  // Varies the work in a tick of those settings that no other one beats in error and number of voxels. Less
-  // work is no cheaper to find out than the setting itself, so that settings that are beaten are not varied.
-  // The number of voxels stands for the cost, and settings that were left out count too. So the choice does
-  // not depend on measured times, and a search that goes on tries the same settings.
+  // Varies the work in a tick of the settings that no other setting dominates in error and number of voxels.
+  // A variation takes as long to play as the setting itself, so dominated settings are not varied. The number
+  // of voxels stands for the cost, and settings that were left out count too. So the choice does not depend
+  // on measured times, and a search that goes on tries the same settings.
   void try_less_work() {
     std::vector<CostAndError> points;
     for (const Trial& trial : trials_) {
@@ -297,7 +297,7 @@ class Search {
     try_settings(settings);
   }
 
-  // With several objects: varies each of them by itself, from the common setting that would be chosen now.
+  // With several objects: varies one object at a time, from the common setting that would be chosen now.
   void refine() {
     const std::vector<std::size_t> whole = whole_trials();
     const Choice choice = choose_setting(points_of(whole, false), result_.bounds);
@@ -364,7 +364,7 @@ class Search {
     for (Trial& trial : trials_) result_.settings.push_back(std::move(trial.tuned));
   }
 
-  // The path, moved to this side, so many times faster, with the truth there.
+  // The scene's motion, moved to this side and `speed` times as fast, with the truth along it.
   [[nodiscard]] SearchMotion moved(double side, double speed) {
     SearchMotion motion = moved_motion(motions_.front(), as_read_, side, speed);
     motion.truth = truth_course(truth_plan(), motion.motion, motion.words, cache_, step_).course;
@@ -372,7 +372,7 @@ class Search {
   }
 
   void confirm() {
-    // First to the side on which the search did not look.
+    // The side on which the search did not play comes first.
     for (const double side : {-1.0, 1.0}) {
       try {
         confirm_on(moved(side, kOtherSpeed));

@@ -61,8 +61,8 @@ struct TuneResult {
   Choice choice;  // its indices refer to `settings`
   Bounds bounds;
   Truth truth;
-  // The search's second motion, in words. A setting whose lattice happens to suit the first one alone is not
-  // accurate. Empty: there is none, as the path cannot be moved.
+  // The search's second motion, in words. A setting whose lattice happens to suit only the first motion is
+  // not accurate. Empty: there is none, as the path cannot be moved.
   std::string second_motion;
   Confirmation confirmation;
   std::vector<TunableObject> objects;

@@ -115,7 +115,7 @@ bool voxels_left(const Setting& setting) {
   return std::ranges::any_of(setting.objects, [](const ObjectSetting& one) { return !one.proxy; });
 }
 
-// Is a proxy enough? If not, how far off is the nearest one?
+// Says whether a proxy is enough, and otherwise the error of the most accurate proxy.
 std::string about_proxies(const TuneResult& result) {
   const TunedSetting& chosen = result.settings[result.chosen];
   const bool enough = !voxels_left(chosen.setting) && result.choice.rule == ChoiceRule::cheapest_accurate;

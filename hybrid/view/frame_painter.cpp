@@ -15,7 +15,7 @@ namespace {
 void keep_freed_memory() {
 #ifdef __GLIBC__
   constexpr int kLargestKept = 32 << 20;  // bytes of a block; the C library accepts no more
-  constexpr int kMostKept = 256 << 20;    // bytes that are free
+  constexpr int kMostKept = 256 << 20;    // bytes of freed memory that the C library keeps
   mallopt(M_MMAP_THRESHOLD, kLargestKept);
   mallopt(M_TRIM_THRESHOLD, kMostKept);
 #endif

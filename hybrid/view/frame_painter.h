@@ -34,8 +34,8 @@ class FramePainter {
     tissue_.set(view);
     return tissue_.asked();
   }
-  // Draws the frame off screen. Call present() or read_rgb() afterwards. Returns false if the frame is as the
-  // one before.
+  // Draws the frame off screen. Call present() or read_rgb() afterwards. Returns false if the frame is the
+  // same as the one before.
   bool paint(const Snapshot& snapshot, const Camera& camera, const FrameOptions& options);
   // Frees all objects in the context. This painter must not paint any more.
   void release() { renderer_.release(); }

@@ -77,7 +77,7 @@ class GlbBuffer {
   Json views_ = Json::array(), accessors_ = Json::array();
 };
 
-// The surface where it is at the snapshot.
+// The surface at its place in the snapshot.
 polygon::TriangleMesh surface_now(const DrawnScene& scene, const Snapshot& now, std::size_t object) {
   polygon::TriangleMesh mesh = scene.objects[object].surface;
   const RigidPlace place = now.place_of(object);
@@ -126,7 +126,7 @@ std::size_t add_glb_object(Json& gltf, GlbBuffer& buffer, const std::string& nam
 
 // A rough surface that is no metal. Where the vertices have colours, the material is white.
 void add_material(Json& gltf, const std::string& name, const glm::vec3& srgb) {
-  constexpr double kRough = 0.6;  // soft highlights, as those of pictures
+  constexpr double kRough = 0.6;  // soft highlights, as in pictures
   gltf["materials"].push_back({{"name", name},
                                {"pbrMetallicRoughness",
                                 {{"baseColorFactor", {linear(srgb.x), linear(srgb.y), linear(srgb.z), 1.0}},

@@ -14,8 +14,8 @@ constexpr float kColumn = 25.0F;  // width of the column beside the scene
 constexpr float kKey = 8.5F;      // width of the key of colours beside a panel
 // Least width of the scene; if it would be narrower, there is no column.
 constexpr float kLeastScene = 16.0F;
-constexpr float kColumnShare = 1.0F / 3.0F;  // most width of the column, as a share of the frame's width
-constexpr float kInsetShare = 0.46F;         // most height of the inset, as a share of the column's height
+constexpr float kColumnShare = 1.0F / 3.0F;  // greatest width of the column (unit: the frame's width)
+constexpr float kInsetShare = 0.46F;         // greatest height of the inset (unit: the column's height)
 // Size of the inset beside a panel, as a share of the scene's shorter side.
 constexpr float kInsetOfScene = 0.34F;
 

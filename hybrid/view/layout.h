@@ -16,7 +16,7 @@ float text_height(int frame_height);
 struct FrameLayout {
   PixelRect scene;
   PixelRect column;  // on the right; width 0 if the frame is too narrow for a column
-  PixelRect key;     // between scene and panel: what the colours of tissue mean; width 0: none
+  PixelRect key;     // between scene and panel: the meaning of tissue colours; width 0: none
   // A square at the lower end of the column, or of the scene if there is a panel. Without a column its width
   // is 0.
   PixelRect inset;

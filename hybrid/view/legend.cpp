@@ -142,7 +142,7 @@ std::vector<PairPress> pairs_by_force(const DrawnScene& scene, const Snapshot& s
   return pairs;
 }
 
-// Both names, of which the longer one is cut: a row that is cut at its end would show only the first.
+// Both names. The longer one is cut, because a row that is cut at its end would show only the first name.
 std::string names_of_pair(const std::string& a, const std::string& b) {
   const auto beside = [](const std::string& other) {
     return kPairLetters - std::min(letters(other), kPairLetters / 2);

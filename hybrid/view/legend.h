@@ -19,11 +19,12 @@ struct LegendRow {
   float alpha = 1.0F;   // of the swatch
 };
 
-// One row for each object and for each material that its surface shows, then the rows of the pairs of objects
-// that press on each other, then the rows of tool and force: about `most` rows. If they do not fit, some are
-// left out, and a last row counts them. The first to be left out are the materials with the least surface,
-// then the pairs with the least force, then rigid objects that nothing touches, then other objects. Many
-// untouched rigid objects always share one row. A material under the tool is marked like its object.
+// One row for each object and for each material that its surface shows. Then follow the rows of the pairs of
+// objects that press on each other, and those of tool and force. There are about `most` rows. If they do not
+// fit, some are left out, and a last row counts them. The first to be left out are the materials with the
+// least surface, then the pairs with the least force, then rigid objects that nothing touches, then other
+// objects. Many untouched rigid objects always share one row. A material under the tool is marked like its
+// object.
 std::vector<LegendRow> legend_rows(const DrawnScene& scene, const Snapshot& snapshot, std::size_t most);
 
 }  // namespace hybrid

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text and charts on a picture: title, time, legend, colour scale, scale bar and labels. In a window also
-// a panel and a help line. It uses Dear ImGui without a backend: the output is triangles in pixels. Its parts
-// are in overlay_parts.h. Only this class, text_painter.cpp and the window's panel use ImGui.
+// The text and charts on a picture: title, time, legend, colour scale, scale bar and labels. In a window
+// there are also a panel and a help line. The overlay uses Dear ImGui without a backend: the output is
+// triangles in pixels. Its parts are in overlay_parts.h. Only this class, text_painter.cpp and the window's
+// panel use ImGui.
 #pragma once
 
 #include <functional>

@@ -37,7 +37,7 @@ std::string value_text(const ColourScale& scale, double share) {
          (differs ? " JND" : " %");
 }
 
-// Where on a scale of differences a hand begins to tell them, as a share; empty: no mark.
+// The place on a scale of differences from which on a hand feels them, as a share; empty: no mark.
 std::optional<float> mark_of(const ColourScale& scale) {
   if (scale.colour != TissueColour::difference || !(scale.end > 1.0)) return {};
   return static_cast<float>(1.0 / scale.end);
@@ -53,7 +53,8 @@ bool contains(const PixelRect& rect, const glm::vec2& at) {
          at.x <= static_cast<float>(rect.x + rect.width) && at.y <= static_cast<float>(rect.y + rect.height);
 }
 
-// The shares of a line between which it lies within a rectangle (Liang & Barsky 1984); first > last: nowhere.
+// The part of a line within a rectangle, as two shares of the line (Liang & Barsky 1984). first > last: no
+// part.
 std::pair<float, float> shares_within(const glm::vec2& from, const glm::vec2& to, const PixelRect& rect) {
   const glm::vec2 low(rect.x, rect.y), high(rect.x + rect.width, rect.y + rect.height), way = to - from;
   float first = 0.0F, last = 1.0F;

@@ -88,7 +88,7 @@ void draw_inset_frame(const Pen& pen, const Snapshot& snapshot, const OverlayCon
 }
 
 void draw_notice(const Pen& pen, const std::string& words, const PixelRect& where) {
-  constexpr float line = 1.35F, margin = 0.8F, share = 0.62F;  // em; em; most width as a share of the scene's
+  constexpr float line = 1.35F, margin = 0.8F, share = 0.62F;  // em; em; greatest width (unit: the scene's)
   const float em = pen.em;
   const std::vector<std::string> lines = pen.wrap(words, share * static_cast<float>(where.width));
   float widest = 0.0F;

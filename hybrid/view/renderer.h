@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Draws a scene and a snapshot with OpenGL 3.3. Pictures and windows both use it. Each has its own context,
-// which must be current on the calling thread for every call here. Hidden things: rigid objects are opaque,
-// except in front of a soft object, of the tool, or of the tool's neighbourhood. There only their nearest
-// surface is drawn, thin in the middle and dense at its rim. The tool and the arrow show faintly through
-// tissue.
+// which must be current on the calling thread for every call here. Rigid objects are opaque, except in front
+// of a soft object, of the tool, or of the tool's neighbourhood. There only their nearest surface is drawn,
+// thin in the middle and dense at its rim. The tool and the arrow show faintly through tissue.
 #pragma once
 
 #include <cstdint>
@@ -42,16 +41,15 @@ class Renderer {
 
   // Sets how the following frames show the scene.
   void set_view(const ViewSettings& view);
-  // A frame whose views and overlay are as before costs no drawing. Otherwise only the part of each view is
-  // drawn in which something changed (view_changes.h).
   // Starts a frame and uploads the snapshot's moving vertices. Width and height are 1 to 8192 pixels;
   // otherwise throws std::runtime_error. `tissue` has taken the snapshot. `scene` must be the scene that the
-  // renderer was made from.
+  // renderer was made from. A frame whose views and overlay are as before costs no drawing. In other frames
+  // only the changed part of each view is drawn (view_changes.h).
   void begin(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue, int width,
              int height);
   // Draws the scene into a part of the frame, over its content. A frame has two such views at most.
   void draw(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const PixelRect& where);
-  // Draws the overlay and ends the frame. Returns false if the frame is as the one before. Throws
+  // Draws the overlay and ends the frame. Returns false if the frame is the same as the one before. Throws
   // std::runtime_error on an OpenGL error anywhere in the frame.
   bool finish(const OverlayMesh& overlay);
 

@@ -78,8 +78,8 @@ void Renderer::State::draw_object(const SceneMesh& object, float alpha, const Va
   uniform("clip_plane", kKeepAll);
 }
 
-// The face of a cut lies in the cut's plane, so rounding could clip it: it keeps all. Slices obey the view's
-// clip plane.
+// The face of a cut lies in the cut's plane, where rounding could clip it. So no plane clips it. The view's
+// clip plane clips slices.
 void Renderer::State::draw_section(const GlSection& section) {
   use(Shading::slice);
   uniform("ramp_share", view.grey ? kRampOverGrey : 1.0F);

@@ -105,7 +105,7 @@ struct Renderer::State {
   [[nodiscard]] Projection projection() const { return {clip, right, up, glm::cross(right, up), pixels}; }
   [[nodiscard]] ShownTool shown_tool(const DrawnScene& scene, const Snapshot& snapshot,
                                      const Camera& camera) const;
-  [[nodiscard]] bool is_outside(const SceneMesh& object, float margin) const;  // is the eye?
+  [[nodiscard]] bool is_outside(const SceneMesh& object, float margin) const;  // is the eye outside?
   void draw_rigid_layer(RigidLayer& rigid);
   void copy_rigid_layer(const RenderedView& from);
   void draw_behind_disc(const RenderedView& to, const glm::mat4& placed_disc);

@@ -15,23 +15,25 @@ namespace hybrid {
 
 inline constexpr glm::vec4 kKeepAll{0.0F, 0.0F, 0.0F, 1.0F};  // a plane that clips nothing
 
-// A picture cuts an object in which one material hides another: the part towards the eye is left out, and the
+// A picture cuts an object in which one material hides another. The part towards the eye is left out, and the
 // face of the cut shows the materials.
-// The cut is a plane through the tool along the force, with its normal towards the eye. Only if
-// the tool presses the object, the object hides a material, and the snapshot has the displacements within it.
+// The cut is a plane through the tool along the force, with its normal towards the eye. There is a cut only
+// if the tool presses the object, the object hides a material, and the snapshot has the displacements within
+// the object.
 [[nodiscard]] std::optional<SectionPlane> choose_cut(const DrawnScene& scene, const Snapshot& snapshot,
                                                      const Camera& camera, std::size_t object);
 
 struct GlSection {
   GlMesh mesh;
   GlName image = 0;
-  std::uint64_t image_number = 0, shape_number = 0, moved_number = 0;  // as uploaded; of TissueSlice
+  std::uint64_t image_number = 0, shape_number = 0,
+                moved_number = 0;  // numbers of the TissueSlice at the last upload
 
   void upload(const Section& section, const DrawMesh& moved, const SectionImage& image_of_section);
   void release();
 };
 
-// How much a part of a mesh changed: at most these, over all its vertices.
+// The greatest changes of the vertices of a part of a mesh.
 struct PartMove {
   float moved_m = 0.0F;
   float recoloured = 0.0F;  // change of DrawVertex::value
@@ -51,7 +53,7 @@ struct SceneMesh {
   glm::vec3 colour{1.0F};
   SceneBounds bounds;         // at rest
   glm::mat4 placed{1.0F};     // from the uploaded pose to the present one
-  float most_moved_m = 0.0F;  // of a vertex, from its place at rest
+  float most_moved_m = 0.0F;  // greatest displacement of a vertex from rest
   std::vector<GlSection> slices;
   GlSection face;            // face of the cut in the present view; empty: no cut
   glm::vec4 kept{kKeepAll};  // plane of the cut: the part on its positive side is drawn
@@ -74,8 +76,8 @@ class SceneMeshes {
   void cut(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, const ViewSettings& view);
   void release();
 
-  // Radius of a ball about the middle of `bounds` (the scene at rest) that contains all that is drawn; one of
-  // a few values (rounded_up()).
+  // Radius of a ball about the middle of `bounds` (the scene at rest) that contains everything that is drawn.
+  // It takes only a few values (rounded_up()).
   [[nodiscard]] double radius_m(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
                                 const SceneBounds& bounds) const;
   [[nodiscard]] const std::vector<SceneMesh>& all() const { return meshes_; }

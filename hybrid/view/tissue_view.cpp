@@ -18,8 +18,8 @@ constexpr double kLeastMoved = 1e-3;
 constexpr double kLeastStrain = 0.01;  // least end of the scale of strain
 constexpr double kLeast_jnd = 1.0;     // least end of the scale of differences: below it nothing is felt
 // The scales of strain and difference end at this percentile of the places with more than the least values.
-// At the rim of a contact single links have several times the strain of the tissue around them, and so have
-// differences at edges.
+// At the rim of a contact single links have several times the strain of the tissue around them. Differences
+// at edges are similar.
 constexpr double kEndShare = 0.98;
 constexpr float kNoStrain = 1e-3F, kNo_jnd = 0.02F;
 
@@ -214,7 +214,7 @@ void TissueView::note_moved(float moved_m) {
     most_moved_m_ = palette::scale_end(size);
 }
 
-// Where nothing is known tissue has its own colour. Elsewhere a value is at least where the ramp begins.
+// Where nothing is known tissue has its own colour. Elsewhere a value is at least the beginning of the ramp.
 void TissueView::take_difference(const FeltDifference* difference) {
   const std::uint64_t number = difference != nullptr ? difference->number : 0;
   if (difference_ == number && differs_) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a view shows of soft objects besides their surfaces: slices, and the values that colour tissue. Says
-// which displacements it needs, and takes them from snapshots. Uses no graphics library.
+// The parts of soft objects that a view shows besides surfaces: slices, and the values that colour tissue.
+// Names the displacements that these need, and takes them from snapshots. Uses no graphics library.
 #pragma once
 
 #include <memory>
@@ -43,7 +43,7 @@ class TissueView {
   void set(const ViewSettings& view);
   // The points whose displacements snapshots should carry (Snapshot::asked); null: none.
   [[nodiscard]] const std::shared_ptr<const AskedPoints>& asked() const { return asked_; }
-  // Takes the displacements of a snapshot. If it has none for asked(), all stays as it was.
+  // Takes the displacements of a snapshot. If it has none for asked(), nothing changes.
   void take(const Snapshot& snapshot);
 
   [[nodiscard]] const std::vector<TissueSlice>& slices(std::size_t object) const {
@@ -58,8 +58,8 @@ class TissueView {
   // The scale of the present colouring. Its end is a round number that never falls, so that colours keep
   // their meaning from frame to frame. A few places of tissue may have a larger strain.
   [[nodiscard]] ColourScale scale() const;
-  // The progress of reading the scans (Scans::in_words()) if grey values are shown; a colouring that has
-  // nothing to show; else empty.
+  // The progress of reading the scans (Scans::in_words()) if grey values are shown, or a note on a colouring
+  // that has nothing to show. Otherwise empty.
   [[nodiscard]] std::string in_words() const;
 
  private:

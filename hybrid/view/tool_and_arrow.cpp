@@ -9,7 +9,7 @@
 namespace hybrid {
 namespace {
 
-// Thickness of the arrow, as a share of the view's height, and its head's in thicknesses.
+// Thickness of the arrow, as a share of the view's height. head_thick: that of its head (unit: the arrow's).
 constexpr double least_thick = 0.0035, most_thick = 0.007, head_thick = 2.4;
 constexpr double punch_height = 3.0;  // height of the body above the face, in radii
 // Distance of the tool's disc from the tool towards the eye, in radii of the disc. The surface that the tool

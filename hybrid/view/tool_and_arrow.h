@@ -26,9 +26,9 @@ struct ArrowPlacement {
 ArrowPlacement place_arrow(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera,
                            const glm::dvec3& origin_m);
 
-// No point of the arrow is further from its axis.
+// Greatest distance of a point of the arrow from the arrow's axis.
 [[nodiscard]] double arrow_thickness_m(const Camera& camera);
-// No point of the tool is further from its place.
+// Greatest distance of a point of the tool from the tool's place.
 [[nodiscard]] double tool_reach_m(const DrawnScene& scene);
 
 // Transform of the unit ball (for a punch: the unit cylinder) to the tool. The lower face of a flat punch is

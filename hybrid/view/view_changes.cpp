@@ -26,7 +26,7 @@ PixelRect grown(const PixelRect& r, const PixelRect& within) {
   return common({r.x - kRim_px, r.y - kRim_px, r.width + 2 * kRim_px, r.height + 2 * kRim_px}, within);
 }
 
-// Samples that a metre covers at most, at the near side of a ball.
+// Greatest number of samples that a metre covers, at the near side of a ball.
 float samples_per_m(const Ball& ball, const Projection& projection) {
   const glm::vec4 depth = glm::row(projection.clip, 3);
   const float distance = glm::dot(glm::vec3(depth), ball.centre) + depth.w - ball.radius;
@@ -41,7 +41,7 @@ bool is_in_view(const Ball& ball, const std::array<glm::vec4, 6>& planes) {
   });
 }
 
-// Contains the part now, and where it was when it was drawn last.
+// A ball that contains the part at its present place and at the place where it was drawn last.
 Ball ball_of(const MeshPart& part, const PartMove& since) {
   return {part.centre, part.radius + since.moved_m};
 }

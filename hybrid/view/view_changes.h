@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Finds the part of a view that differs from the frame before. Only this part is drawn, so that the cost of a
-// frame follows what moved. The rest of the view keeps its pixels.
+// frame depends on the part of the scene that moved. The rest of the view keeps its pixels.
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -55,7 +55,7 @@ struct ShownTool {
   }
 };
 
-// A view as its textures hold it.
+// The contents of a view's textures.
 class ShownView {
  public:
   // The part to draw in this frame; empty: none. Call once in each frame in which the view is shown. The
@@ -71,7 +71,7 @@ class ShownView {
   bool known_ = false;
   ViewKey key_;
   ShownTool tool_;
-  std::vector<std::vector<PartMove>> stale_;  // [object][part] most that it has moved since it was drawn
+  std::vector<std::vector<PartMove>> stale_;  // [object][part] greatest motion since it was drawn
 };
 
 }  // namespace hybrid

@@ -13,14 +13,14 @@
 
 namespace hybrid::controls {
 
-// Reserves a place for a chart. Whatever comes next is below it.
+// Reserves a place for a chart. The next control is below it.
 [[nodiscard]] PixelRect take_place(float height);
 // Writes a label at the left; the next control comes beside it.
 void label_beside(const Pen& pen, const std::string& words);
 // Writes a label in a line of controls.
 void label(const std::string& words);
 void same_line();
-// Controls between these two do not react if `fixed`.
+// Controls between begin_fixed(true) and end_fixed() do not react.
 void begin_fixed(bool fixed);
 void end_fixed();
 
@@ -36,7 +36,7 @@ struct Slid {
   bool held = false;     // the user holds the slider
   bool let_go = false;   // the user let go of it in this frame, after a change
 };
-// `format`: of the number, as of printf().
+// `format`: format of the number, as for printf().
 Slid slide(const char* id, float& value, float low, float high, const std::string& format,
            bool logarithmic = false);
 // A tip for the last control, shown while the pointer is on it and holds nothing.

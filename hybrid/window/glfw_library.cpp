@@ -49,11 +49,11 @@ int note_break(void*) {
   return 0;
 }
 
-// After note_break() Xlib calls this one, and ends the program only if there is none.
+// Xlib calls this handler after note_break(). Without such a handler Xlib would end the program.
 void go_on(void*, void*) {}
 
 // By default Xlib ends the program at the first error of a display, and the session would be lost. GLFW loads
-// Xlib itself, if the display needs it, so its functions are looked up.
+// Xlib only if the display needs it, so the functions of Xlib are looked up here.
 void survive_errors_of_display() {
   void* const xlib = dlopen("libX11.so.6", RTLD_LAZY | RTLD_NOLOAD);
   void* const of_glfw = dlsym(RTLD_DEFAULT, "glfwGetX11Display");

@@ -16,7 +16,7 @@ std::string why_window_is_lost();
 // Is the connection to the display broken? Then even closing the window would wait for an answer.
 bool display_is_gone();
 
-// A key with a name, as the library knows it and as the panel does.
+// A key by its name, with its numbers in the library and in the panel.
 struct NamedKey {
   std::string_view name;
   int glfw;

@@ -9,8 +9,8 @@ namespace hybrid {
 namespace {
 
 constexpr double kLength_em = 6.0;    // of an arrow
-constexpr double kReach_em = 0.9;     // from a handle, within which it is taken
-constexpr double kLeastPixels = 6.0;  // of an arrow as it is seen, to be dragged along
+constexpr double kReach_em = 0.9;     // distance of the pointer within which a handle is taken
+constexpr double kLeastPixels = 6.0;  // least length in the view of an arrow that can be dragged
 
 }  // namespace
 

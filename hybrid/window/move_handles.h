@@ -44,8 +44,8 @@ struct MoveHandles {
 class ObjectMover {
  public:
   // Call once a frame. Handles are shown on the selected object, if the user wants them and the object may be
-  // changed. After a drag they show its new place until the changed scene is there, or until nothing is
-  // built.
+  // changed. After a drag they show the object's new place until the changed scene is there, or until no
+  // scene is being built.
   void place(const ViewState& user, const DrawnScene& scene, bool building);
   [[nodiscard]] const MoveHandles* handles() const { return handles_ ? &*handles_ : nullptr; }
 
@@ -60,7 +60,7 @@ class ObjectMover {
 
   std::optional<MoveHandles> handles_;
   std::uint32_t object_ = Edit::kTool;
-  int frames_left_ = 0;  // for which the new place is shown although nothing is built
+  int frames_left_ = 0;  // number of frames in which the new place is shown although no scene is being built
 };
 
 }  // namespace hybrid

@@ -106,8 +106,8 @@ void draw_series(const Pen& pen, const ChartBox& box, const TickHistory& history
   }
 }
 
-// Where in the chart is the force at rest? A band of one just noticeable difference on either side. It has
-// gaps where no force at rest was found for kLongestGap_s.
+// Draws the force at rest as a band of one just noticeable difference on either side. The band has gaps where
+// no force at rest was found for kLongestGap_s.
 void draw_at_rest(const Pen& pen, const ChartBox& box, const TickHistory& history, double top_N) {
   constexpr double kLongestGap_s = 0.25;
   const auto& forces = history.at_rest();
@@ -132,7 +132,7 @@ void draw_at_rest(const Pen& pen, const ChartBox& box, const TickHistory& histor
   }
 }
 
-// The difference from the force at rest: of the newest force at rest, and the largest in the chart.
+// The newest difference from the force at rest, and the largest one in the chart.
 std::string words_at_rest(const TickHistory& history) {
   double most_jnd = 0.0;
   for (const ForceAtRest& found : history.at_rest()) most_jnd = std::max(most_jnd, found.jnd());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The panel's controls for changes that need a new world: model, energy, spacing, Young's modulus. The effect
-// of the last one.
+// The panel's controls for changes that need a new world: model, energy, spacing, Young's modulus. Also shows
+// the effect of the last change.
 #include <array>
 #include <limits>
 #include <string>

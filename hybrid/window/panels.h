@@ -26,7 +26,7 @@ struct SessionNotes {
   std::uint64_t unseen_ticks = 0;   // ticks missing in the charts because a frame took too long
   std::string message{};            // result of the last action; empty: none
   std::string error{};              // error in the scene's file; empty: none
-  // Kept states, the oldest first: how long ago they were (s), and the memory of all.
+  // Ages of the kept states (s), the oldest first, and the memory of all of them.
   std::vector<double> kept_s{};
   std::size_t kept_bytes = 0;
   std::string building{};                // progress of a changed scene that is built; empty: none
@@ -103,7 +103,7 @@ class Panels final : public OverlayPanel {
   struct AskedYoung {
     std::string material;
     float young_kPa = 0.0F;
-    int frames_left = 0;  // for which it is shown although nothing is built
+    int frames_left = 0;  // number of frames in which it is shown although no scene is being built
   };
   std::optional<AskedYoung> asked_young_;
   // The models of an object that the user chose to compare.

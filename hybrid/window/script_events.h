@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a script does with mouse and keyboard, frame by frame. Uses no graphics library.
+// The events of mouse and keyboard that a script causes, frame by frame. Uses no graphics library.
 #pragma once
 
 #include <cstdint>

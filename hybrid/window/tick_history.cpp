@@ -109,7 +109,7 @@ std::optional<TickHistory::NumberRange> TickHistory::range(
 }
 
 void TickHistory::mark(double t_s) {
-  // What came before an earlier mark was of yet another scene.
+  // The ticks before an earlier mark belong to yet another scene.
   const double from_s = mark_ ? mark_->t_s : 0.0;
   mark_ = ChangeMark{
       .t_s = t_s, .before = times(from_s, t_s), .most_before_N = most_N(ForceSeries::total, from_s, t_s)};

@@ -16,7 +16,7 @@
 namespace hybrid {
 
 // The total force, its part from rigid or from soft objects, and further parts (TickResult). Damping includes
-// texture. Limits and passivity are what these take away.
+// texture. Limits and passivity: the force that these take away.
 enum class ForceSeries : std::uint8_t { total, rigid, soft, friction, damping, limits, passivity };
 inline constexpr std::size_t kForceSeries = 7;
 
@@ -67,8 +67,8 @@ class TickHistory {
 
   // The range of forces in each of `count` columns, the newest last. Empty: no tick is in the column.
   [[nodiscard]] std::vector<std::optional<ColumnRange>> columns(ForceSeries series, std::size_t count) const;
-  // The parts of the force, in each of `count` columns: of the tick with the largest force in it. Empty: no
-  // tick is in the column.
+  // The parts of the force in each of `count` columns, from the tick with the largest force in the column.
+  // Empty: no tick is in the column.
   using Parts = std::array<float, kForceParts>;
   [[nodiscard]] std::vector<std::optional<Parts>> parts(std::size_t count) const;
   // A number of the newest tick, and its range. Empty: there is no tick.

@@ -48,9 +48,9 @@ std::vector<std::string> words_of(const std::filesystem::path& file, int width, 
           kOutputName};
 }
 
-// Starts ffmpeg with the reading end of the pipe as its standard input and `output` as kOutput. It has a
-// process group of its own: a terminal sends Ctrl-C to the whole group of the program, and ffmpeg has to
-// write the frames up to then. Returns an error number, or 0.
+// Starts ffmpeg with the reading end of the pipe as its standard input, and the file as kOutput. ffmpeg gets
+// its own process group, because a terminal sends Ctrl-C to the whole group of the program. After a Ctrl-C
+// ffmpeg still has to write the last frames. Returns an error number, or 0.
 int start(const std::vector<std::string>& words, int input, int output, pid_t& process) {
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);

@@ -16,7 +16,7 @@ namespace hybrid {
 namespace {
 
 constexpr double kLeast_mm = 1e-3, kMost_mm = 1e6;  // of a spacing; scenes refuse others
-constexpr std::size_t kScriptPlaces = 300;          // of a difference of two models
+constexpr std::size_t kScriptPlaces = 300;          // places of a difference of two models, if none are given
 
 // The kinds of arguments that a command has.
 enum class ScriptArguments : std::uint8_t {
@@ -435,7 +435,7 @@ std::vector<ViewAction> ViewScript::due(double t_s) {
 
 void ViewScript::play(double t_s, Window& window) {
   for (ViewAction& action : due(t_s)) {
-    if (action.object < objects_.size()) {  // its number may be another one by now
+    if (action.object < objects_.size()) {  // its number may have changed since the script was read
       const auto& objects = window.scene().objects;
       const auto at = std::ranges::find(objects, objects_[action.object], &DrawnObject::name);
       if (at == objects.end()) continue;

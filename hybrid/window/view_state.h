@@ -14,34 +14,34 @@
 namespace hybrid {
 
 enum class ViewVerb : std::uint8_t {
-  pause,           // numbers: 1 on, 0 off, none: toggle
-  step,            // does one tick while paused
-  rest,            // numbers: 1 compares with the force at rest, 0 ends it, none: toggle
-  stack,           // numbers: 1 the parts of the force as areas, 0 as lines, none: toggle
-  watch,           // text: name of a number of the tick, which is watched from now on, or no longer
-  speed,           // numbers: simulated time over real time
-  restart,         // starts the hand's path again
-  edit,            // object, quantity, numbers: the value in SI
-  change,          // change: of the scene, which is built again
-  difference,      // comparison: of two models over a surface, which it begins; without an object: ends it
-  look_back,       // numbers: seconds before now; 0: the present
-  go_on,           // the session goes on from the past that is shown
-  arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
-  select,          // object
-  show,            // object, numbers: 1 visible, 0 hidden
-  opacity,         // object, numbers: 0 to 1
-  clip,            // numbers: 1 on, 0 off, none: toggle
-  clip_axis,       // numbers: 0 x, 1 y, 2 z
-  clip_place,      // numbers: 0 to 1 along the axis
-  clip_side,       // leaves out the other side
-  slice,           // numbers: axis (0 x, 1 y, 2 z), place 0 to 1, or negative: off; none: all on or all off
-  slice_grey,      // numbers: 1 grey values of the scan, 0 materials, none: toggle
-  colour,          // numbers: TissueColour; none: the next one
-  look,            // text: "all", "contact", "x", "y", "z"
-  dark,            // numbers: 1 dark, 0 light, none: toggle
-  panels,          // numbers: 1 shown, 0 hidden, none: toggle
-  inset,           // numbers: 1 shown, 0 hidden, none: toggle
-  screenshot,      // text: the file; empty: an unused name
+  pause,       // numbers: 1 on, 0 off, none: toggle
+  step,        // does one tick while paused
+  rest,        // numbers: 1 compares with the force at rest, 0 ends it, none: toggle
+  stack,       // numbers: 1 the parts of the force as areas, 0 as lines, none: toggle
+  watch,       // text: name of a number of the tick; begins to watch it, or ends
+  speed,       // numbers: simulated time over real time
+  restart,     // starts the hand's path again
+  edit,        // object, quantity, numbers: the value in SI
+  change,      // change: of the scene, which is built again
+  difference,  // comparison: begins it, of two models over a surface; without an object: ends the present one
+  look_back,   // numbers: seconds before now; 0: the present
+  go_on,       // the session goes on from the past that is shown
+  arrows,      // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
+  select,      // object
+  show,        // object, numbers: 1 visible, 0 hidden
+  opacity,     // object, numbers: 0 to 1
+  clip,        // numbers: 1 on, 0 off, none: toggle
+  clip_axis,   // numbers: 0 x, 1 y, 2 z
+  clip_place,  // numbers: 0 to 1 along the axis
+  clip_side,   // leaves out the other side
+  slice,       // numbers: axis (0 x, 1 y, 2 z), place 0 to 1, or negative: off; none: all on or all off
+  slice_grey,  // numbers: 1 grey values of the scan, 0 materials, none: toggle
+  colour,      // numbers: TissueColour; none: the next one
+  look,        // text: "all", "contact", "x", "y", "z"
+  dark,        // numbers: 1 dark, 0 light, none: toggle
+  panels,      // numbers: 1 shown, 0 hidden, none: toggle
+  inset,       // numbers: 1 shown, 0 hidden, none: toggle
+  screenshot,  // text: the file; empty: an unused name
   save_recording,  // text: the file; empty: an unused name
   save_scene,      // writes edits to the scene's file
   reload,          // reads the scene's file again
@@ -73,17 +73,19 @@ struct ViewState {
   bool paused = false, compares_with_rest = false;
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;
-  double back_s = 0.0;  // how far before now the shown state is; the session pauses meanwhile; 0: the present
+  double back_s = 0.0;  // age of the shown state; the session pauses while it is shown; 0: the present
   bool go_on = false;
   std::vector<Edit> edits{};
   std::vector<SceneChange> changes{};
-  std::optional<ModelComparison> comparison{};                     // to begin; without an object: to end
+  std::optional<ModelComparison>
+      comparison{};  // comparison to begin; without an object: the present one ends
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look
 };
 
-// A change of the scene is shown as asked for, although nothing is built yet, for so many frames at most.
+// Greatest number of frames in which a requested change of the scene is shown although no scene is being
+// built.
 inline constexpr int kFramesUntilBuilding = 30;
 
 // Least speed, as a share of real time. Speeds up to 1 are allowed.

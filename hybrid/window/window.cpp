@@ -32,7 +32,7 @@ struct CloseWindow {
 
 enum class Drag { none, orbit, pan, tool, slice, object };
 
-constexpr int kMostPixels = 8192;        // most pixels along a side of a frame
+constexpr int kMostPixels = 8192;        // greatest number of pixels along a side of a frame
 constexpr double kIdle_s = 1.0 / 120.0;  // wait for input after a frame in which nothing changed
 constexpr double kDepthStep = 0.01;  // of the dragged tool, for a turn of the wheel (unit: the view's height)
 constexpr float kSlowest_s = 0.25F;  // longest time between frames that the panel gets
@@ -274,8 +274,8 @@ struct Window::State {
     show(changed, options);
   }
 
-  // A frame as the one before is not shown again. Then there is no wait for the display's refresh, so wait
-  // here.
+  // A frame that equals the one before is not shown again. This function then waits in place of the display's
+  // refresh.
   void show(bool changed, const FrameOptions& frame) {
     if (changed || std::exchange(exposed, false)) {
       painter->present(frame.width, frame.height);
@@ -342,7 +342,7 @@ void Window::show_scene(const DrawnScene& scene, std::optional<double> changed_a
   s.scene = &scene;
   s.box = soft_box(scene);
   s.mover = {};
-  s.user.back_s = 0.0;  // states of the scene before are not kept
+  s.user.back_s = 0.0;  // states of the previous scene are not kept
   s.painter.emplace(scene, Samples::fast, s.height);
   if (changed_at_s) {
     s.history.mark(*changed_at_s);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The viewer's window. It only reads snapshots. It reports the requests of mouse, keyboard, panel and
-// scripts, and leaves it to the session to act on them. Only it and glfw_library.cpp know GLFW. All calls
-// must come from the program's first thread. The keys are in README.md and in window_keys.h.
+// scripts, and the session carries them out. Only this class and glfw_library.cpp know GLFW. All calls must
+// come from the program's first thread. The keys are in README.md and in window_keys.h.
 #pragma once
 
 #include <filesystem>

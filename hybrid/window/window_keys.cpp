@@ -7,7 +7,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kBackStep_s = 1.0;  // step into the past of a press of , or .
+constexpr double kBackStep_s = 1.0;  // time step of a press of , or .
 constexpr double kClipStep = 0.02;   // step of a press of [ or ], as a share of the scene's size
 
 struct KeyAction {

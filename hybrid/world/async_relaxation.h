@@ -24,7 +24,7 @@ enum class Arrival : std::uint8_t {
   thread,    // relaxed by the thread; applied when it is done
   recorded,  // relaxed at once; applied in the tick whose recorded `arrived` has the object's bit
   played,    // not relaxed, because another thread installs recorded results; applied as `recorded` is
-  at_once,  // relaxed and applied whole in the tick of the submission; for references, which nobody waits for
+  at_once,   // relaxed and applied whole in the tick of the submission; for references, which may be slow
 };
 
 // The copy (shadow) of one soft object. `phase` says who may use the copy now, the tick or the thread.

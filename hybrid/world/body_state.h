@@ -31,7 +31,7 @@ struct BodyObstacles {
   std::vector<std::uint8_t> listed;       // [surface voxel] 1: in `near`
   std::vector<std::uint8_t> jammed;       // [surface voxel] 1: could not move out of a free body's way
   std::vector<std::uint32_t> near;        // surface voxels near a body
-  std::vector<std::vector<BodyQuery>> queries;  // [rigid][surface voxel]; empty: presses no tissue
+  std::vector<std::vector<BodyQuery>> queries;  // [rigid][surface voxel]; empty: the body presses no tissue
 };
 
 // The place of another object's surface that is nearest to a point, in the other object's frame.

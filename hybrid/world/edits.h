@@ -50,7 +50,7 @@ struct EditableValue {
 };
 
 // All values that may be edited: of the tool, then object by object. A soft object has none if it may meet
-// another soft object, if the scene has a free body, or if its tissue is plastic: forces other than the
+// another soft object, if the scene has a free body, or if its tissue is plastic. Then forces other than the
 // reaction on the tool would have to scale as well.
 [[nodiscard]] std::vector<EditableValue> editable_values(const World& world, const WorldState& state);
 

@@ -113,9 +113,9 @@ class ContactSolver {
 
   // Returns false if the velocities would not be finite. A semi-smooth Newton method minimises an energy that
   // is convex in the velocities: the sum of a quadratic, the energy of unilateral contacts, and the
-  // dissipation by friction. A line search shortens each step to where the energy no longer falls, so the
-  // method cannot cycle. Friction bounds use the normal forces of the previous solution. If the iterations
-  // run out, contacts may pull a little.
+  // dissipation by friction. A line search ends each step at the point where the energy no longer falls, so
+  // the method cannot cycle. Friction bounds use the normal forces of the previous solution. If the
+  // iterations run out, contacts may pull a little.
   bool solve() noexcept {
     std::fill(x_.begin(), x_.end(), 0.0);
     for (std::size_t c = 0; c < one_sided_; ++c) active_[c] = !(contacts_[c].force_N < 0.0);

@@ -17,8 +17,8 @@ namespace {
 
 using Row = nlohmann::ordered_json;
 
-// The least changes that a user notices: a tick that takes one period of 1 kHz longer, and a second of
-// waiting.
+// The least changes that a user notices: a tick that is longer by one period of 1 kHz, and a wait that is
+// longer by a second.
 constexpr double kTickPeriod_us = 1e3, kWait_us = 1e6;
 
 struct MatchedRows {
@@ -146,9 +146,8 @@ bool same_basis(const MatchedRows& rows, std::string_view basis) {
   return all_equal(values);
 }
 
-// Is the figure judged by the rank test? Measured figures are. So are exact figures that the reports do not
-// show to be exact: their values differ between the old runs, or between the new runs if there is a single
-// old run.
+// Is the figure judged by the rank test? Every measured figure is. An exact figure is too if its values
+// differ between the old runs. With a single old run, its values in the new runs decide.
 bool is_ranked(const ReportKey& key, const MatchedRows& rows, const ComparedFigure& figure) {
   if (key.kind == KeyKind::measured) return true;
   if (!all_numbers(figure.old_values) || !all_numbers(figure.new_values)) return false;
@@ -186,7 +185,7 @@ void judge_ranked(ComparedFigure& figure) {
 }
 
 // Judges the figures of a family together. Figures whose values are all equal are left out: they carry no
-// information, however the runs are divided into old and new ones.
+// information for any division of the runs into old and new ones.
 void judge_family(Family family, ReportComparison& comparison) {
   std::vector<ComparedFigure*> members;
   std::vector<double> p;

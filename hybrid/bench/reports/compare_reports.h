@@ -17,9 +17,9 @@
 
 namespace hybrid::bench {
 
-// Measured figures are tested in three families. Users feel only a few figures. Those have families of their
-// own, because a small family needs fewer runs. `rate` is the share of comparisons of a build with itself in
-// which some figure of the family may be called changed. The rates add up to 5 %.
+// Measured figures are tested in three families. Users feel only a few figures. These few have families of
+// their own, because a small family needs fewer runs. `rate` is the share of comparisons of a build with
+// itself in which some figure of the family may be called changed. The rates add up to 5 %.
 enum class Family : std::uint8_t {
   overall,  // geometric mean of a figure over the product's rows in a suite
   felt,     // median and p99 of a row of the product
@@ -41,13 +41,13 @@ struct ComparedFigure {
   std::string suite, row;           // `row`: the keys that tell it from other rows of its suite, in words
   nlohmann::ordered_json identity;  // all keys that identify the row
   std::string key;
-  bool product = true;            // false: of a baseline
+  bool product = true;            // false: the row is of a baseline
   Family family = Family::other;  // only of a ranked figure
   bool ranked = false;            // judged by the rank test; otherwise by equality
   std::size_t rank = 0;           // place of its key among the keys of the suite
   double noticed =
       0.0;  // change / least change that a user notices (a tick's period, or a second of waiting)
-  // The values of all runs. In a ranked figure null stands for infinity: it was never reached.
+  // The values of all runs. In a ranked figure null stands for infinity: the goal was never reached.
   std::vector<nlohmann::ordered_json> old_values, new_values;
   std::optional<Quartiles> old_spread, new_spread;  // only of ranked figures
   double ratio = 0.0;                               // new median over old median; 0: not defined
@@ -62,7 +62,7 @@ struct ReportComparison {
   std::vector<std::string> only_old, only_new;  // rows that only one side has
   struct Tested {
     std::size_t figures = 0;
-    // Least number of changed figures for the test to name any; 0: it never can.
+    // Least number of changed figures at which the test can name any of them; 0: no number suffices.
     std::size_t at_once = 0;
     std::size_t runs_for_one = 0;  // runs on each side that are needed to name a single figure
   };

@@ -42,7 +42,7 @@ constexpr std::array kRigidKeys{
     ReportKey{"steps_max", exact, "ticks"},
     ReportKey{"steps_mean", exact, "ticks"},
     ReportKey{"surveys_per_tick", exact, "ticks"},
-    ReportKey{"bytes", measured},  // the hierarchy is built by several threads
+    ReportKey{"bytes", measured},  // differs, because several threads build the hierarchy
     ReportKey{"p50_us", measured},
     ReportKey{"p99_us", measured},
     ReportKey{"p999_us", measured},
@@ -151,7 +151,7 @@ constexpr std::array kScenesKeys{
     ReportKey{"ticks"},
     ReportKey{"contact_ticks", exact, "ticks"},
     ReportKey{"soft_voxels"},
-    ReportKey{"memory_bytes", measured},  // hierarchies are built by several threads
+    ReportKey{"memory_bytes", measured},  // differs, because several threads build hierarchies
     ReportKey{"p50_us.median", measured},
     ReportKey{"p50_us.least", measured},
     ReportKey{"p50_us.most", measured},
@@ -178,7 +178,7 @@ constexpr std::array kThesisKeys{
     ReportKey{"speed_mm_per_s", identity},
     ReportKey{"elements", detail},
     ReportKey{"thesis_percent", detail},
-    ReportKey{"ticks", context},             // of a cube that is late the session ends early
+    ReportKey{"ticks", context},             // the session of a late cube ends early
     ReportKey{"force_error_jnd", measured},  // the largest cube depends on the machine
     ReportKey{"voxels", measured},
     ReportKey{"edge", measured},

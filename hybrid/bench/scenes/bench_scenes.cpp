@@ -31,7 +31,7 @@ bool same_materials_energy(const std::vector<TunableObject>& objects) {
   return std::ranges::none_of(objects, &TunableObject::other_energy);
 }
 
-// The scene with the same change in all soft objects that allow it; `left_out` if none does.
+// The scene with the same change in all soft objects that allow it. Sets `left_out` if none allows it.
 Variant with_all(const Scene& as_read, const std::vector<TunableObject>& objects, const std::string& name,
                  const std::function<void(const TunableObject&, ObjectSetting&)>& change) {
   Variant variant{.name = name, .words = {}};

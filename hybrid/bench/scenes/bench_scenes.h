@@ -30,8 +30,8 @@ struct SceneRow {
   std::uint64_t ticks = 0, contact_ticks = 0;  // of one session
   int repeats = 0;
   OverRepeats p50_us{}, p99_us{}, p999_us{}, max_us{};
-  // p99 over that of the scene as given, in the same turn: median of the turns. `sure`: in every turn it was
-  // on the same side of 1.
+  // p99 over that of the scene as given, in the same turn: median of the turns. `sure`: the ratio is on the
+  // same side of 1 in every turn.
   double p99_ratio = 1.0;
   bool sure = false;
   ForceError own_error{};                           // against the same session, played slowly
@@ -41,8 +41,8 @@ struct SceneRow {
   std::vector<std::string> faults{};
 };
 
-// The p99 of a row differs more between repeats than this share of its median: the machine was too noisy to
-// tell smaller differences.
+// If the p99 of a row differs more between repeats than this share of its median, the machine was too noisy
+// to tell smaller differences.
 inline constexpr double kNoisy = 0.2;
 [[nodiscard]] bool noisy(const SceneRow& row);
 

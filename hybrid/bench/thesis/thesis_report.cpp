@@ -48,8 +48,8 @@ double session_sum(const ThesisStudy& study, bool voxel_by_voxel) {
   return sum;
 }
 
-// The largest cubes of one engine, in words, with the share of their ticks in contact: an engine that loses
-// its contact serves larger cubes.
+// The largest cubes of one engine, in words, with the share of their ticks in contact. An engine that loses
+// its contact has less work, and so serves larger cubes.
 std::string served(const ThesisStudy& study, SoftEngine engine) {
   std::string list;
   std::size_t hands = 0, every = 0, most = 0;

@@ -27,7 +27,7 @@ namespace hybrid::bench {
 namespace {
 
 constexpr double kSpacing_m = 1e-3, kToolRadius_m = 4e-3;
-// Of the links, as shares of their rest length: slack of the tissue, and of the core.
+// Slack of the links, as a share of their rest length: in the tissue, and in the core.
 constexpr double kSlack = 0.1, kCoreSlack = 0.05;
 constexpr double kYoung_Pa = 1e4, kCoreYoung_Pa = 1e5;
 constexpr double kCore = 0.4;  // edge of the core, as a share of the cube's
@@ -36,7 +36,7 @@ constexpr double kMostOfLimit = 0.6;
 constexpr int kPairEdge = 29;  // 24,389 voxels
 constexpr std::size_t kPairTriangles = 11'200;
 constexpr double kSeconds = 2.0, kQuickSeconds = 0.3;
-// Their number of voxels doubles about from one to the next.
+// Edges of the cubes (voxels). Each cube has about twice as many voxels as the one before.
 constexpr std::array kEdges{8, 10, 13, 16, 20, 25, 32, 40, 50, 64, 80, 100, 128};
 constexpr int kQuickMostEdge = 64;
 
@@ -134,7 +134,7 @@ class Study {
   }
   static const Vigour& normal() { return *std::ranges::find(vigours(), "normal", &Vigour::name); }
 
-  // A late session is played once more: another program may have held the processor up.
+  // A late session is played once more, because another program may have used the processor.
   template <class Play>
   StudyTicks played_until_in_time(const Play& play) const {
     const StudyTicks first = play();

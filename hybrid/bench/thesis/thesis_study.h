@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The study of the thesis (chapter V), repeated in one run for its own algorithm (`classic`) and for the
-// product: the largest cube that is served at 1 kHz, under a hand that presses gently to vigorously; the pair
-// of 24,000 voxels and 11,200 triangles; and the shares of the threads (Table 5).
+// product. Its parts are the largest cube that is served at 1 kHz under a gentle to vigorous hand, the pair
+// of 24,000 voxels and 11,200 triangles, and the shares of the threads (Table 5).
 #pragma once
 
 #include <cstdint>
@@ -23,15 +23,16 @@ inline constexpr double kStudyPeriod_us = 1000.0;  // of the servo loop: 1 kHz, 
 // A cube is in time if at most this share of its ticks takes longer than the period.
 inline constexpr double kMostLate = 1e-3;
 
-// How a hand presses a cube again and again. The more vigorous, the deeper and the faster.
+// How a hand presses a cube again and again. A more vigorous hand presses deeper and faster.
 struct Vigour {
   std::string name;  // "gentle", "normal", "vigorous"; empty: a step between them
   double depth_mm = 0.0, speed_mm_per_s = 0.0;
 };
 const std::vector<Vigour>& vigours();
 
-// Times of the ticks of one session. Of classic: its six-direction check, its chain and its force. Its
-// relaxation, which the thesis gave a thread of its own, is not in them. Of the product: the whole tick.
+// Times of the ticks of one session. A tick of classic is its six-direction check, its chain and its force.
+// The relaxation of classic does not count, because the thesis ran it on its own thread. A tick of the
+// product is the whole tick.
 struct StudyTicks {
   std::uint64_t ticks = 0;
   Percentiles tick_us;
@@ -47,9 +48,9 @@ struct LargestCube {
   Vigour vigour;
   int edge = 0;  // voxels; 0: not even the smallest cube is in time
   std::size_t voxels = 0;
-  int late_edge = 0;      // edge of the next larger cube, which is late; 0: none larger was tried
+  int late_edge = 0;      // edge of the next larger cube, which is late; 0: no larger one was tried
   StudyTicks of_largest;  // empty if edge is 0
-  // Of the product: p99 of the force's error in that cube, against the same session played slowly.
+  // Only for the product: p99 of the force's error in that cube, against the same session played slowly.
   std::optional<double> error_jnd;
 };
 
@@ -93,7 +94,7 @@ ThesisStudy study_thesis(const ThesisOptions& options);
 // less deep, so that the hand feels the tissue and not its anchors.
 Scene study_cube(int edge, const Vigour& vigour, double seconds);
 // The same cube as a closed mesh of about `triangles` triangles, in a temporary file that lives as long as
-// this object. study_mesh(): the scene in which it is felt through the proxy.
+// this object. study_mesh(): the scene in which the mesh is felt through the proxy.
 class CubeMeshFile {
  public:
   CubeMeshFile(int edge, std::size_t triangles);

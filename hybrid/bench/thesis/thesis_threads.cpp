@@ -12,7 +12,7 @@
 namespace hybrid::bench {
 namespace {
 
-// Of the whole process: a software renderer has threads of its own.
+// Processor time of the whole process, because a software renderer has threads of its own.
 double process_time_s() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);

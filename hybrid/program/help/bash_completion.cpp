@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Completions for bash, from the program's own options. The generated function finds the command among the
-// words before the cursor, then completes the value of the option before it, or an option, or an argument.
+// words before the cursor. Then it completes the value of the last option, or an option, or an argument.
 #include <CLI/CLI.hpp>
 #include <sstream>
 
@@ -9,8 +9,8 @@
 namespace hybrid {
 namespace {
 
-// Functions that every completion uses. The last part of a list with commas is completed by itself. With
-// --option=value bash has the '=' as a word of its own.
+// Functions that every completion uses. The last part of a list with commas is completed by itself. In
+// --option=value bash takes the '=' as a separate word.
 constexpr const char* kHead =
     R"(# Completions of the program hybrid, for bash. Written by `hybrid --bash-completion`.
 _hybrid_words() {
@@ -51,8 +51,8 @@ std::vector<const CLI::Option*> options_of(const CLI::App& app, bool positional)
   return app.get_options([positional](const CLI::Option* o) { return o->get_positional() == positional; });
 }
 
-// The values of a known set, "{a,b}" or "{a->1,b->2}" in the type, with spaces between; empty if there is
-// none.
+// The set of values in the option's type, "{a,b}" or "{a->1,b->2}", separated by spaces. Empty if the type
+// has no set.
 std::string known_values(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   const std::size_t begin = type.find('{'), end = type.find('}');

@@ -14,7 +14,7 @@ namespace hybrid {
 std::string did_you_mean(const CLI::App& app, const std::vector<std::string>& arguments);
 
 // A message that refuses a name which is not in `known`. It suggests the most similar known name, if one is
-// similar, and lists all. Empty if `known` has the name.
+// similar, and lists all known names. Empty if `known` has the name.
 std::string unknown_name(const std::string& name, const std::vector<std::string>& known);
 
 }  // namespace hybrid

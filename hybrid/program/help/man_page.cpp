@@ -9,7 +9,8 @@ namespace hybrid {
 namespace {
 
 // Text as roff prints it: '\' begins an escape, '-' would become a hyphen that cannot be pasted into a shell,
-// and '.' or ''' at the begin of a line would be a request. A line may be broken after the commas of a set.
+// and '.' or ''' at the beginning of a line would be a request. A line may be broken after the commas of a
+// set.
 std::string roff(const std::string& text) {
   std::string out;
   bool line_begins = true;
@@ -28,7 +29,7 @@ std::string roff(const std::string& text) {
   return out;
 }
 
-// Paragraphs, of which indented lines stay as they are: examples.
+// Prints paragraphs. Indented lines are examples and stay as they are.
 void print_text(std::ostream& page, const std::string& text) {
   std::istringstream lines(text);
   bool in_example = false;
@@ -44,7 +45,7 @@ void print_text(std::ostream& page, const std::string& text) {
   if (in_example) page << ".RE\n.fi\n";
 }
 
-// What an option or an argument takes, as in its help: "INT in [0 - 1000000]", "{quick,full}".
+// The values that an option or argument takes, as in its help: "INT in [0 - 1000000]", "{quick,full}".
 std::string option_values(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   const std::size_t set = type.find('{');
@@ -109,7 +110,7 @@ void print_command(std::ostream& page, const CLI::App& app, const std::string& a
 
 std::string man_page(const CLI::App& app, const std::string& version) {
   std::ostringstream page;
-  // Neither adjusted nor hyphenated: options and names of files stay whole.
+  // Turns adjustment and hyphenation off, so that options and names of files stay whole.
   page << ".TH HYBRID 1 \"\" \"hybrid " << version << "\" \"User Commands\"\n.nh\n.ad l\n";
   page << ".SH NAME\nhybrid \\- haptic renderer for scenes of rigid and soft objects\n";
   page << ".SH SYNOPSIS\n\\fBhybrid\\fR \\fICOMMAND\\fR [\\fIOPTIONS\\fR] [\\fIFILES\\fR]\n";

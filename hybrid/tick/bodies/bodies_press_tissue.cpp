@@ -219,8 +219,8 @@ class TissueAtBodies {
     for (std::size_t s = 0; s < object_.lattice().surface().size(); ++s) object_.mark_dirty(s);
   }
   // Is voxel s inside a moving body, and is there a way out that does not lead into a fixed surface? If the
-  // shortest way out leads into one, the voxel gets a half-space that moves it out along the fixed surface,
-  // in each tick until it is out.
+  // shortest way out leads into one, the voxel gets another half-space in each tick until it is out. This one
+  // moves the voxel out along the fixed surface.
   bool set_way_out(std::uint32_t s) noexcept {
     const voxel::Obstacle &moving = beside_.moving[s], &standing = beside_.standing[s];
     if (!is_set(moving)) return false;

@@ -44,7 +44,8 @@ class Collisions : private CollisionQueries {
       place_after();
       if (follow_ways(round)) break;
       if (round < kRounds) continue;
-      ++all_.round;  // voids queries made on ways, because bodies that stand still did not go there
+      ++all_.round;  // makes the queries on ways invalid, because a body that stands still did not take its
+                     // way
       place_after();
       break;
     }
@@ -205,8 +206,8 @@ class Collisions : private CollisionQueries {
     const glm::dvec3 at = position(pair, side, i);
     return {now_[b].to_body(now_[a].to_scene(at)), after_[b].to_body(after_[a].to_scene(at))};
   }
-  // Follows a point in the other object's frame. `met`: on entry, the point's query at the start of the tick;
-  // on return, the surface that the point came too near to, or else the query at the end of the way.
+  // Follows a point in the other object's frame. `met`, on entry: the point's query at the start of the tick.
+  // On return: the surface that the point came too near to, or else the query at the end of the way.
   // `queried`: true on return if queries were made on the way.
   bool way_is_free(const BodyPair& pair, Side side, std::size_t i, NearestSurface& met,
                    bool& queried) noexcept {
@@ -238,7 +239,7 @@ class Collisions : private CollisionQueries {
   }
   // Adds a contact between a point and the half-space that it met on its way. The contact's gap is the
   // distance at the end of the way, without the part that the free bodies' motion in the last solution
-  // contributes: the next solution finds this motion anew.
+  // contributes. The next solution finds this motion anew.
   void add_contact_on_way(BodyPair& pair, Side side, std::size_t i, const NearestSurface& met) noexcept {
     const SurfacePoint& p = point(pair, side, i);
     const auto [from, to] = way_of(pair, side, i);

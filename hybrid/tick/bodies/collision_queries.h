@@ -53,7 +53,7 @@ class CollisionQueries {
     return travel(pair) - query.queried_at_m;
   }
 
-  // Have both objects hardly moved since the query? Pairs at rest therefore need no new query.
+  // Have both objects hardly moved since the query? If so, the point needs no new query.
   [[nodiscard]] bool is_current(const BodyPair& pair, const PointQuery& query) const noexcept;
 
   // Sets now_ to the poses before this tick. Objects on paths have moved already, so their poses at the end

@@ -15,9 +15,9 @@ namespace {
 
 // Greatest number of attempts to move the proxy aside when a body pushes it into another body.
 constexpr int kMaxWaysAside = 8;
-// A body comes to rest after kRestTicks ticks in which it moves by at most kRestMotion (spacings) and two
-// forces are below kRestForce (share of the load): the change of the force on it, and the unbalanced force.
-// It wakes when it exceeds kWakeFactor times one of these bounds.
+// A body comes to rest after kRestTicks ticks in which it meets two bounds. It moves by at most kRestMotion
+// (spacings). The change of the force on it, and the unbalanced force, are below kRestForce (share of the
+// load). It wakes when it exceeds kWakeFactor times one of these bounds.
 constexpr std::uint32_t kRestTicks = 100;
 constexpr double kRestMotion = 1e-5, kRestForce = 1e-3, kWakeFactor = 3.0;
 // A proxy this near to a place counts as being there (unit: the ball's radius).
@@ -69,7 +69,7 @@ void step_aside(const World& world, WorldState& state, std::uint32_t object, con
   state.faults |= fault_infeasible;
 }
 
-// Does this body carry the proxy along? It does if friction holds the proxy there or lets it slide.
+// Does this body carry the proxy along? It does if friction holds the proxy on the body or lets it slide.
 bool carries_proxy(const WorldState& state, std::uint32_t object) noexcept {
   return (state.stuck || state.sliding) && state.active_count > 0 && state.rubbed == object;
 }

@@ -22,7 +22,7 @@ constexpr double kOnBody = 1e-3;     // spacings: a voxel this near to the body 
 // Regularises directions that the normals hardly span. Unit: trace of the sum of n nᵀ over the normals n.
 constexpr double kRegularisation = 1e-3;
 // Factor on the stiffness with which links resist a body. The part beyond 1 acts as a damper. It is needed
-// under asynchronous relaxation: between two results tissue acts as a spring, and a result may return energy
+// under asynchronous relaxation. Between two results tissue acts as a spring, and a result may return energy
 // that tissue took up before an earlier result. Without the damper bodies would hop.
 constexpr double kLinkDamping = 3.0;
 // Factor on the stiffness of links at their limits. Their shares of a load change abruptly, which would make
@@ -151,12 +151,11 @@ double distance_to_body_m(const voxel::SoftObject& object, std::uint32_t s, cons
 // the body along the normal.
 //
 // If AdmmRegion has found multipliers that balance all loads, these are the forces. Otherwise only the sum of
-// the loads is known where links are at their limits, because such links pass loads from voxel to voxel, also
-// across the normals. The forces along the normals may lack a part of this sum. This part is divided among
-// the voxels at limits, along their normals, such that the sum of the squared shares is least. If instead
-// each voxel got the load that its links show, a ball would turn, although no surface without friction can
-// turn a ball. The shares are not exact either: their torque does not support a box. So multipliers are
-// preferred.
+// the loads is known where links are at their limits. Such links pass loads from voxel to voxel, also across
+// the normals. The forces along the normals may lack a part of this sum. This part is divided among the
+// voxels at limits, along their normals, such that the sum of the squared shares is least. If instead each
+// voxel got the load that its links show, a ball would turn, although no surface without friction can turn a
+// ball. The shares are not exact either: their torque does not support a box. So multipliers are preferred.
 void add_pressing(const World& world, WorldState& state, std::uint32_t b, std::size_t o) noexcept {
   const voxel::SoftObject& object = *state.soft[o];
   const BodyObstacles& beside = state.body_obstacles[o];

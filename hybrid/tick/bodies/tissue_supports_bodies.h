@@ -21,8 +21,8 @@ namespace hybrid {
 // Spacings: a body that is deeper in tissue at the end of a step or tick is moved back.
 inline constexpr double kTooDeep = 0.02;
 
-// Depth in spacings by which a body may overlap a jammed voxel. Some overlap must remain: a voxel that can
-// leave again shows it by a smaller overlap.
+// Depth in spacings by which a body may overlap a jammed voxel. Some overlap must remain, because a smaller
+// overlap shows that the voxel can leave again.
 inline constexpr double kJammedProbe = 0.01;
 
 // The smallest spacing of all soft objects (m); there must be one.
@@ -32,8 +32,8 @@ inline constexpr double kJammedProbe = 0.01;
 // Returns how many of them are tissue links; contacts that are as good as rigid follow them.
 std::size_t add_tissue_contacts(const World& world, WorldState& state, std::uint32_t b, double dt_s) noexcept;
 
-// If free body `b`, at `pose` within this tick, is deeper in tissue than `limit` (spacings): moves it back,
-// ends its motion into the tissue and returns true.
+// Is free body `b`, at `pose` within this tick, deeper in tissue than `limit` (spacings)? If so, moves it
+// back, ends its motion into the tissue and returns true.
 bool give_way_to_tissue(const World& world, WorldState& state, std::uint32_t b, const Pose& pose,
                         double limit, double dt_s) noexcept;
 

@@ -16,7 +16,8 @@ constexpr int kShadingPasses = 8;  // sweeps of shade(), at most
 constexpr int kSlidingPasses = 8;  // sweeps of apply_friction(), at most
 // A tangential pull that exceeds the friction by less than this share of it counts as on the friction cone.
 constexpr double kConeTolerance = 1e-4;
-constexpr double kShadingConverged = 1e-6;  // of the depth: a pass that moves the proxy less is the last
+constexpr double kShadingConverged =
+    1e-6;  // share of the depth; a pass that moves the proxy less is the last
 
 struct Contact {
   const RigidObject* object = nullptr;
@@ -81,8 +82,8 @@ MixedFeel mixed_feel(const Contacts& contacts) noexcept {
   return mix_feel({surfaces.data(), contacts.count});
 }
 
-// The object that friction and shading are accounted to: of those that have either, the one with the largest
-// force.
+// The object to which friction and shading are attributed: the one with the largest force of those that have
+// either.
 std::uint32_t friction_object(const Contacts& contacts) noexcept {
   const Contact* hardest = nullptr;
   for (const Contact& c : contacts) {
@@ -92,7 +93,7 @@ std::uint32_t friction_object(const Contacts& contacts) noexcept {
   return hardest != nullptr ? hardest->number : contacts.list[0].number;
 }
 
-// Target of the proxy, and the longest way there.
+// Target of the proxy, and the greatest length of the way there.
 struct Goal {
   glm::dvec3 target{0.0};
   glm::dmat3 metric{1.0};

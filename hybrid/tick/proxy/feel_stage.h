@@ -10,7 +10,7 @@ namespace hybrid {
 // The sweep from state.proxy_m with the feel of the touched objects: shading turns the goal, friction keeps
 // the proxy or lets it slide. `force_N` of the result is the whole force of the surfaces on the proxy.
 //
-// Friction is judged at the proxy, with the contacts that held it at the end of the last pass: on a curved
+// Friction is judged at the proxy, with the contacts that held it at the end of the last pass. On a curved
 // surface the normal at the frictionless goal differs. The first pass of a contact is therefore frictionless.
 // `first_pass`: of the tick. In later passes a proxy that slid comes to rest on the dynamic cone, and still
 // counts as sliding in the next tick.

@@ -11,10 +11,11 @@ namespace hybrid {
 namespace {
 
 // A survey that finds more elements than it may list ends, and is repeated with the margin times kShrink.
-// After kTries such surveys it may list more, and begins with the first margin again. If the last survey
-// found few elements, its margin may have grown in free space. Then the first limit is kMostOfGood times the
-// target number. The next limit is the usual size of a neighbourhood. The last one is for the pole of a fan,
-// where very many triangles share a corner; it holds down to the smallest margin.
+// After kTries such surveys the limit is raised, and the first margin is tried again. The first limit is
+// kMostOfGood times the target number. It applies only if the last survey found few elements, because the
+// margin may then have grown in free space. The second limit is the usual size of a neighbourhood. The third
+// one is for the pole of a fan, where very many triangles share a corner. With this limit the margin shrinks
+// to its least value.
 constexpr int kTries = 3;
 constexpr double kMostOfGood = 4.0;  // (unit: the target number)
 constexpr double kShrink = 0.125;
@@ -23,17 +24,17 @@ constexpr double kCentreAhead = 0.6;  // distance from the proxy to the centre o
 // The survey then covers a larger ball of places, which reaches as far along the surface but has far fewer
 // elements within touching distance (reach_of()).
 constexpr double kLift = 4.0;
-// Target number of elements in a survey. Fewer are soon left behind, more take long to read. A ball has more
-// elements in contact range than a point has.
+// Target number of elements in a survey. With fewer the proxy soon leaves the survey; more take long to read.
+// A ball has more elements in contact range than a point has.
 constexpr double kGoodCount = 16.0, kGoodUnderBall = 104.0;
 // The margin doubles for a longer way only below this count (unit: elements). The next count is then at most
 // four times as large along a surface, which a narrow survey may hold.
 constexpr double kMostBeforeGrowth = 2.0 * kGoodCount;
-// Work, in elements listed: of a survey beside its elements; of a plane that is made anew. kPlanesOfWork:
-// number of planes that are read at the cost of one element.
+// Work in units of one listed element: of a survey in addition to its elements, and of a renewed plane.
+// kPlanesOfWork: number of planes that are read at the cost of one element.
 constexpr std::uint32_t kWorkOfSurvey = 32, kWorkOfPlane = 2, kPlanesOfWork = 64;
-// The proxy is at the pole of a fan if a survey finds more than kPoleCount times the elements of the last
-// one, although its margin is less than kPoleMargin times the last margin.
+// The proxy is at the pole of a fan if a survey with less than kPoleMargin times the last margin finds at
+// least kPoleCount times the elements of the last survey.
 constexpr double kPoleCount = 0.7;
 constexpr double kPoleMargin = 0.6;
 constexpr double kRangeGrowth = 4.0;  // growth of the range when it cut a step
@@ -44,7 +45,7 @@ double max_component(const glm::dvec3& v) noexcept {
 
 }  // namespace
 
-// Makes the planes anew that `from` violates.
+// Renews the planes that `from` violates.
 void ProxySurroundings::renew_planes(const glm::dvec3& from) noexcept {
   for (std::uint32_t o = 0; o < world_.rigid.size(); ++o) {
     if (scope_.kind != Scope::Kind::all && (scope_.kind == Scope::Kind::only) != (o == scope_.object))
@@ -83,8 +84,8 @@ bool ProxySurroundings::survey_from(const glm::dvec3& point) noexcept {
   return true;
 }
 
-// The bits of the objects within look_m of the viewpoint. An element that holds the proxy answers for the
-// only object of a scene without a query, and the map would say the same.
+// The bits of the objects within look_m of the viewpoint. If the scene has a single object, the element that
+// holds the proxy gives the answer without a query. The map's answer would be the same.
 std::uint64_t ProxySurroundings::near_objects() noexcept {
   if (world_.rigid.size() == 1 && state_.active_count > 0) {
     const glm::dvec3 view = state_.rigid[0].frame.to_body(point_);
@@ -135,9 +136,9 @@ bool ProxySurroundings::survey(std::uint32_t o, const glm::dvec3& view, bool mov
 }
 
 // Centre and reach of a survey, such that the proxy may move by the margin along the surface, and further
-// ahead. If the centre is t above the surface and the reach is s, a ball of radius r may touch the elements
-// within about sqrt(2 r (s − t)) of the contact. The higher the centre, the smaller s − t, and the fewer the
-// elements.
+// ahead. Let the centre be t above the surface, and let the reach be s. Then a ball of radius r may touch the
+// elements within about sqrt(2 r (s − t)) of the contact. The higher the centre, the smaller s − t, and the
+// fewer the elements.
 ProxySurroundings::Reach ProxySurroundings::reach_of(const RigidState& near, const glm::dvec3& view,
                                                      bool moving) const noexcept {
   const double margin = near.margin_m;
@@ -173,7 +174,7 @@ void ProxySurroundings::adapt_margin(RigidState& near) const noexcept {
   near.margin_counted_m = near.margin_m;
   if (pole) {
     near.margin_m *= 2.0;
-  } else if (surveys_ < 3 || count < good) {  // else the way of this tick needs the margin
+  } else if (surveys_ < 3 || count < good) {  // otherwise the way of this tick needs the margin
     near.margin_m *= std::clamp(std::sqrt(good / count), 0.5, 1.5);
   }
 }
@@ -240,8 +241,8 @@ void ProxySurroundings::first_in_object(std::uint32_t o, const glm::dvec3& q, do
   constexpr double kWholeWay = 2.0;  // no part of the way is cut
   const auto clear_part = [&](const polygon::SeparatingPlane& plane) {
     const auto depth = [&plane](const glm::dvec3& at) { return plane.offset - glm::dot(plane.normal, at); };
-    // The way leaves a plane that only its first part violates: there the proxy is on the wrong side by
-    // rounding.
+    // If only the first part of the way violates a plane, the proxy is on the wrong side by rounding. Such a
+    // plane does not end the way.
     if (!(depth(end) > tolerance && depth(goal) > tolerance)) return kWholeWay;
     return polygon::Neighbourhood::fraction_before(plane, view, end);
   };

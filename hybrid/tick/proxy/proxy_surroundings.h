@@ -39,8 +39,8 @@ class ProxySurroundings {
   // side of kept planes.
   void renew_planes(const glm::dvec3& from) noexcept;
 
-  // Makes `point` the viewpoint. Queries again if the known range does not cover it, or ended the last way.
-  // False if too many elements meet there.
+  // Makes `point` the viewpoint. Queries again if the known range does not cover the point, or if it ended
+  // the last way. False if too many elements meet there.
   bool survey_from(const glm::dvec3& point) noexcept;
   // Makes `point`, which is known to be covered, the viewpoint.
   void set_viewpoint(const glm::dvec3& point) noexcept { point_ = point; }
@@ -54,9 +54,9 @@ class ProxySurroundings {
     query_cut_way_ = false;
   }
 
-  // The element that the first `part` of the way to q meets first, with the plane that shows it; object
-  // kNobody if there is none. `held`: the proxy's active planes. An element behind one of them is no obstacle
-  // of its own.
+  // The element that the first `part` of the way to q meets first, with its plane. `object` is kNobody if
+  // there is none. `held`: the proxy's active planes. An element behind one of them is no obstacle of its
+  // own.
   ProxyPlane first_in_the_way(const glm::dvec3& q, double part, std::span<const ProxyPlane> held) noexcept;
 
   // Is the whole straight way to q known and clear?

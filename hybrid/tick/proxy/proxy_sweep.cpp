@@ -13,15 +13,16 @@ namespace {
 
 constexpr std::uint32_t kMaxSteps = 64;      // steps of one sweep
 constexpr std::uint32_t kMaxExchanges = 64;  // planes added or renewed in one step
-constexpr std::uint32_t kMaxCrossings = 16;  // of nearly flat edges, in one sweep
+constexpr std::uint32_t kMaxCrossings = 16;  // crossings of nearly flat edges in one sweep
 // A shorter step ends the sweep; relative to the way to the target, and to the ball's radius.
 constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
 // When no plane holds the proxy any more, the next obstacle is near. So the first search covers only a part
 // of the way, kShortPart of the last step's length. Without an obstacle there, the part is multiplied by
 // kPartGrowth. kLeastPart: lower bound (unit: the way).
 constexpr double kShortPart = 0.05, kPartGrowth = 32.0, kLeastPart = 1e-9;
-// For a round step (take_round_step()), in units of the ball's radius: how far beyond the minimum over the
-// present planes it may go; the length over which the turning of the planes is measured.
+// Lengths of a round step (take_round_step()); unit: the ball's radius. kRoundStep: how far the step may go
+// beyond the minimum over the present planes. kTurnStep: length over which the turning of the planes is
+// measured.
 constexpr double kRoundStep = 0.5, kTurnStep = 1e-4;
 
 class Sweeper {
@@ -59,8 +60,7 @@ class Sweeper {
       point_ = sweep.point;
       leave_trail(point_);
       if (exhausted() || !around_.survey_from(point_)) break;
-      if (sweep.steps == 0 &&
-          goes_on) {  // on the triangle that held it last: crosses to the next one without a search
+      if (sweep.steps == 0 && goes_on) {  // the proxy is on the triangle that held it last
         const Crossing crossing = cross_edges(sweep.point, travel);
         if (crossing == Crossing::moved) continue;
         sweep.arrived = crossing == Crossing::arrived;
@@ -159,8 +159,8 @@ class Sweeper {
     return true;
   }
 
-  // Is the point reached better than the minimum that was skipped for it? If not, returns to that minimum and
-  // takes no round step for a while.
+  // Is the cost at the point reached lower than at the minimum that the round step skipped? If not, returns
+  // to that minimum and takes no round step for a while.
   bool round_step_paid() noexcept {
     const glm::dvec3 reached = point_ + fraction_ * (minimum_.point - point_);
     constexpr double kSame = 1.0 + 1e-14;  // allows for rounding of the cost
@@ -205,7 +205,7 @@ class Sweeper {
         held = from;
         set_viewpoint(point);
         around_.renew_planes(point);
-        // The known neighbourhood ends on this way: look there first.
+        // The known neighbourhood ends on this way, so it is queried there first.
         if (around_.range_cut_way()) return Crossing::moved;
         break;
       }
@@ -326,8 +326,8 @@ class Sweeper {
     const polygon::NearPoint near = world_.rigid[held.object].surface->closest(held.element, view);
     if (!held.flat) return near.distance <= radius_ * (1.0 + kConvergedBall) + 4.0 * rounding_;
     // The ball lies on the face if the closest point of the element is the foot of the perpendicular on the
-    // plane. The distance alone is a poor test: beyond an edge it grows only with the square of the way, so
-    // it would stay within the tolerance for up to the square root of the tolerance.
+    // plane. The distance alone is a poor test. Beyond an edge it grows only with the square of the way. So
+    // it stays within the tolerance for a way of up to the square root of the tolerance.
     const glm::dvec3 away = view - near.point;
     const glm::dvec3 aside = away - glm::dot(away, held.in_body.normal) * held.in_body.normal;
     return glm::length(aside) <= 4.0 * rounding_;
@@ -393,8 +393,9 @@ class Sweeper {
   std::uint32_t held_count_ = 0;
   polygon::PlaneMinimum minimum_;
   struct RoundStep {
-    bool taken = false;                     // the last step was a round step
-    std::uint32_t waits = 0, patience = 1;  // steps until the next round step, since one did not pay
+    bool taken = false;  // the last step was a round step
+    std::uint32_t waits = 0,
+                  patience = 1;  // steps until the next round step; it doubles after each that did not pay
     glm::dvec3 instead{0.0}, to{0.0};
   } round_;
   std::uint32_t crossings_ = 0;

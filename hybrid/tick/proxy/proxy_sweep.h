@@ -14,7 +14,7 @@ struct Sweep {
   std::uint32_t work = 0;                // elements listed and planes renewed, weighted by their cost
 };
 
-// Most work of one sweep (unit: elements listed). At this bound the sweep stops before it has arrived,
+// Greatest work of one sweep (unit: elements listed). At this bound the sweep stops before it has arrived,
 // outside everything rigid, and the next tick continues it. The last survey or step may exceed the bound by
 // the work of one neighbourhood.
 inline constexpr std::uint32_t kMostSweepWork = 8192;

@@ -71,7 +71,7 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
       return false;
     state.proxy_m = next;
     if (last) {
-      if (world.soft.empty()) {  // for the ticks to come
+      if (world.soft.empty()) {  // keeps a query for the next ticks
         state.look_at = goal;
         state.look_m = radius + kQueryCells * state.map.cell_m();
         state.look_mask = state.map.rigid_in(goal - state.look_m, goal + state.look_m, state.map_trail);

@@ -17,8 +17,8 @@ bool advance_through_free_space(const World& world, WorldState& state, const glm
 // session must not start there.
 bool start_proxy(const World& world, WorldState& state, const glm::dvec3& device_m) noexcept;
 
-// Writes the half-spaces of rigid elements within `radius` of `point` to state.scratch.planes, the nearest if
-// there are too many. Returns the distance from `point` up to which they are complete (m).
+// Writes the half-spaces of rigid elements within `radius` of `point` to state.scratch.planes; if there are
+// too many, only the nearest. Returns the distance from `point` up to which they are complete (m).
 double gather_planes(const World& world, WorldState& state, const glm::dvec3& point, double radius) noexcept;
 
 // The rigid part of the tick alone: map, contact, proxy, coupling. It has no friction, damping, texture or

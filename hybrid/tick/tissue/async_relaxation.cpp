@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMaxAsync = 64;  // bits of AsyncRelaxation::arrived
 // Rows of a result that are applied per tick: at most kMaxRowsApplied, which take about 100 µs. In a tick
-// with a cycle of a large contact patch, the remaining work of the tick is the limit; a row counts as
+// with a cycle of a large contact patch, the remaining work of the tick is the limit. A row then counts as
 // kWorkOfRow, including its obstacle queries. But at least kLeastRows are applied, because a result that
 // waits delays the next one.
 constexpr std::size_t kMaxRowsApplied = 250, kLeastRows = 100, kWorkOfRow = 16;
@@ -55,8 +55,8 @@ void submit(WorldState& state, AsyncObject& object, std::size_t o) noexcept {
   object.due = state.tick + 1 + object.shadow.work() / kRowsRelaxed;
 }
 
-// A result in real time is late by the work of its cycle, which grows with the number of voxels. A reference
-// that has its results as late comes the less to rest the finer its lattice is.
+// Results arrive at once. In real time a result is late by the work of its cycle, which grows with the number
+// of voxels. With such a delay, a reference on a finer lattice would be further from rest.
 void exchange_at_once(WorldState& state, std::size_t o) noexcept {
   AsyncObject& object = *state.async.objects[o];
   voxel::SoftObject& soft = *state.soft[o];

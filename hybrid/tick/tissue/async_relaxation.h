@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The background stage of the tick: tissue away from the contact relaxes towards its equilibrium, either in
-// the tick, by a budget of voxel updates, or asynchronously (hybrid/world/async_relaxation.h).
+// The background stage of the tick: tissue away from the contact relaxes towards its equilibrium. It relaxes
+// in the tick, by a budget of voxel updates, or asynchronously (hybrid/world/async_relaxation.h).
 #pragma once
 
 #include "hybrid/world/world_state.h"

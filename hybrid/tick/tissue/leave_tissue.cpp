@@ -13,7 +13,7 @@
 namespace hybrid {
 namespace {
 
-constexpr double kMostPlaces = 1000.0;  // that a search tries in one direction
+constexpr double kMostPlaces = 1000.0;  // greatest number of places that a search tries in one direction
 
 bool is_filled(const voxel::Lattice& lattice, const glm::dvec3& at) noexcept {
   std::array<int, 3> cell{};

@@ -19,9 +19,9 @@ constexpr std::size_t kObstacleQueries = 24;   // exact queries a tick
 constexpr std::size_t kArrivedQueries = 40;
 constexpr double kInside = 0.01;  // spacings: a voxel deeper than this in a surface leaves it
 // kMovedEnough, kUnknownAhead and kKnownAhead are in spacings. A voxel queries again when two things hold: it
-// has moved by kMovedEnough, and it is within kUnknownAhead of where it might meet a surface unknown to it.
-// For a voxel with an obstacle the second distance is kKnownAhead, because its ball of half a spacing meets
-// no other surface earlier.
+// has moved by kMovedEnough, and it may meet an unknown surface within kUnknownAhead. For a voxel with an
+// obstacle the second distance is kKnownAhead, because its ball of half a spacing meets no other surface
+// earlier.
 constexpr float kMovedEnough = 0.25F, kUnknownAhead = 2.0F, kKnownAhead = 0.6F;
 // In objects with bricks, a voxel on its obstacle queries again when it has slid by kSlideOnObstacle
 // (spacings), so that it follows a curved surface. Links give way only along their axes and hardly need this.

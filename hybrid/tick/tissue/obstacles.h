@@ -27,9 +27,9 @@ NearestRigid nearest_rigid(const World& world, const WorldState& state, const gl
 // already overlaps keeps its depth. Returns how many voxels have an obstacle.
 std::size_t find_obstacles(const World& world, WorldState& state, std::size_t soft);
 
-// In the tick: queries rigid surfaces again for voxels that moved, a bounded number per tick. Voxels come
-// first that may soonest meet a surface unknown to them. Candidates are the voxels that the tool touches, the
-// rows that waves moved, and a slice of all surface voxels.
+// In the tick: queries rigid surfaces again for voxels that moved, a bounded number per tick. Voxels that may
+// soonest meet an unknown surface come first. Candidates are the voxels that the tool touches, the rows that
+// waves moved, and a slice of all surface voxels.
 void refresh_obstacles(const World& world, WorldState& state) noexcept;
 // In the tick: queries rigid surfaces again for rows that an asynchronous result moved, possibly far. A voxel
 // inside a surface unknown to it leaves that surface at once.

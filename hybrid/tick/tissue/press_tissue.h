@@ -38,7 +38,7 @@ void prepare_patches(const World& world, WorldState& state, const glm::dvec3& po
 void refresh_map(const World& world, WorldState& state) noexcept;
 
 // For loops over surface voxels in turns: prefetches the displacement of a voxel whose turn comes soon.
-// Waiting for memory was half of the loop's time.
+// Otherwise half of the loop's time would be waiting for memory.
 inline void prefetch_surface(const voxel::SoftObject& object, std::uint32_t number) noexcept {
   constexpr std::uint32_t kAhead = 16;  // voxels
   const auto surface = object.lattice().surface();

@@ -4,8 +4,8 @@
 //
 // Work is counted, never timed, so that the same inputs give the same bits; only the time that it takes
 // depends on the machine. In real time the share follows the measured duration of ticks. With a smaller share
-// a moving contact comes to rest some ticks later; at rest nothing differs. The share is recorded, and a
-// replayed session uses the recorded one.
+// a moving contact comes to rest some ticks later. The force at rest is the same. The share is recorded, and
+// a replayed session uses the recorded one.
 #pragma once
 
 #include <algorithm>

@@ -51,7 +51,7 @@ void bind_image(GlName image);  // to the first unit
 GlName link_program(const char* vertex, const char* fragment);
 void delete_program(GlName program);
 
-// Which planes of the program in use clip: that of a cut, and that of the view.
+// Selects which planes of the program in use clip: the plane of a cut, and that of the view.
 void clip_by_planes(bool cut, bool view);
 // Are the backs of triangles left out?
 void hide_backs(bool hidden);
@@ -77,7 +77,7 @@ struct GlMesh {
   // Replaces the vertices. Orphans the old storage, so that the driver need not wait for the previous frame.
   void stream(const DrawMesh& mesh) const;
   void draw() const;
-  // Draws the parts that may be in the view of `clip_from_mesh`. `margin`, `values`: as of seen_ranges().
+  // Draws the parts that may be in the view of `clip_from_mesh`. `margin`, `values`: as for seen_ranges().
   void draw_seen(const glm::mat4& clip_from_mesh, float margin, const ValueRange& values = {}) const;
   // Deletes the buffers. The mesh is empty afterwards.
   void release();
@@ -111,7 +111,7 @@ struct GlCover {
 // The textures of one view. They keep their content from frame to frame.
 struct ViewTargets {
   GlLayer scene;
-  GlName shown_frame = 0, shown_depth = 0;  // depth of what must not be hidden
+  GlName shown_frame = 0, shown_depth = 0;  // depth of the objects that must not be hidden
 
   // Builds the textures anew if the size (samples) differs. Returns true if it did.
   bool set_size(int width, int height);

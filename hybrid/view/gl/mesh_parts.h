@@ -44,12 +44,12 @@ std::array<glm::vec4, 6> planes_of_view(const glm::mat4& clip_from_mesh);
 void update_parts(const DrawMesh& mesh, std::span<MeshPart> parts);
 
 // The indices of all parts that may be in the view and whose values are in a range. Touching ranges are
-// joined. `margin`: most distance of a vertex from its place in the part (mesh's frame).
+// joined. `margin`: greatest distance of a vertex from its place in the part (mesh's frame).
 std::vector<IndexRange> seen_ranges(std::span<const MeshPart> parts, const glm::mat4& clip_from_mesh,
                                     float margin, const ValueRange& values = {});
 
-// Is every edge shared by exactly two triangles that agree on their side, and is the volume positive? Then
-// the back of no triangle is seen from outside.
+// Is every edge shared by exactly two triangles that agree on their side, and is the volume positive? Then no
+// back of a triangle is visible from outside.
 bool is_closed_outwards(const polygon::TriangleMesh& mesh);
 
 }  // namespace hybrid

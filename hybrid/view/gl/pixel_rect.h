@@ -10,7 +10,7 @@ struct PixelRect {
   int x = 0, y = 0, width = 0, height = 0;
 
   [[nodiscard]] bool empty() const { return width < 1 || height < 1; }
-  // Does it contain all of another rectangle?
+  // Does this rectangle contain the whole of `other`?
   [[nodiscard]] bool contains(const PixelRect& other) const {
     return other.empty() || (other.x >= x && other.y >= y && other.x + other.width <= x + width &&
                              other.y + other.height <= y + height);

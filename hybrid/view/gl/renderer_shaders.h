@@ -46,7 +46,7 @@ uniform vec4 clip_plane;        // the same of the view's clip plane
 uniform float nearer;           // length by which the surface is drawn towards the eye (scene)
 out vec3 scene_position;
 #ifdef LIT_BY_VERTEX
-out vec3 light;                 // as of light_on()
+out vec3 light;                 // as in light_on()
 #else
 out vec3 scene_normal;
 #endif
@@ -80,7 +80,7 @@ void main() {
 inline constexpr const char* mesh_fragment = R"(
 in vec3 scene_position;
 #ifdef UNHIDING
-uniform sampler2D shown_depth;  // depth of what must not be hidden
+uniform sampler2D shown_depth;  // depth of the objects that must not be hidden
 uniform mat4 clip_from_scene;
 uniform float apart;  // least length by which a surface in front hides another (scene)
 // Does this fragment hide something? It counts with the depth that it would have if it were further from the

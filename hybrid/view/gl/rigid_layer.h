@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The layer of rigid objects: the nearest rigid surface at each pixel of a view. It is drawn again only if
-// the view or a rigid object has moved. What must not be hidden lies before or behind it, pixel by pixel.
+// the view or a rigid object has moved. Objects that must not be hidden are in front of the layer or behind
+// it, pixel by pixel.
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -31,8 +32,8 @@ struct RigidLayer {
 // takes few values, and a moving tool seldom changes the depths of the other objects.
 [[nodiscard]] double rounded_up(double radius, double least);
 
-// a and b of `change = b (depth + a)²`: how much greater the depth (0 to 1) of a point becomes that moves
-// away from the eye by a small length. The matrix is that of a perspective projection and a rigid transform.
+// a and b of `change = b (depth + a)²`: the increase of the depth (0 to 1) of a point that moves away from
+// the eye by a small length. The matrix is that of a perspective projection and a rigid transform.
 [[nodiscard]] glm::vec2 depth_further(const glm::dmat4& clip_from_scene, double by_m);
 
 }  // namespace hybrid

@@ -27,8 +27,8 @@ class ShadingPrograms {
  public:
   void create();
   void release();
-  // `by_vertex`: lighting is computed at vertices and interpolated between them, which costs much less where
-  // triangles are a few pixels large and there is no graphics card.
+  // `by_vertex`: lighting is computed at vertices and interpolated between them. Without a graphics card this
+  // costs much less for triangles of a few pixels.
   [[nodiscard]] GlName of(Shading shading, bool by_vertex) const {
     return programs_[by_vertex ? 1 : 0][static_cast<std::size_t>(shading)];
   }

@@ -86,8 +86,8 @@ DrawMesh creased_mesh(const polygon::TriangleMesh& mesh, const glm::dvec3& origi
   DrawMesh draw;
   draw.vertices.reserve(3 * kept.size());
   draw.indices.reserve(3 * kept.size());
-  // Most triangles that count around a vertex. Without a limit the cost would be quadratic in the triangles
-  // that share a vertex, which may be all of them.
+  // Greatest number of triangles that count around a vertex. Without a limit the cost would be quadratic in
+  // the triangles that share a vertex, which may be all of them.
   constexpr std::uint32_t at_most = 64;
   for (std::size_t t = 0; t < kept.size(); ++t) {
     const double own = glm::length(area[t]);
