@@ -50,7 +50,7 @@ TEST(RowFields, NumbersAreReadWithEitherMarkAndGroupsOfThree) {
   const auto comma = [](std::string_view text) { return number_in<double>(text, DecimalMark::comma); };
   EXPECT_EQ(point("-1.5e3"), -1500.0);
   EXPECT_EQ(point("+.5"), 0.5);
-  const std::string minus = "\xE2\x88\x92";  // of Unicode
+  const std::string minus = "\xE2\x88\x92";  // the minus sign of Unicode
   EXPECT_EQ(point(minus + "1.5e" + minus + "3"), -1.5e-3);
   EXPECT_EQ(comma(minus + "1,5"), -1.5);
   EXPECT_FALSE(point("-" + minus + "2"));
