@@ -229,7 +229,7 @@ TEST(HouseRules, OnlyInterfaceAndTestsIncludeHybridFromOutside) {
   });
 }
 
-// Examples are programs of users: they see the public header alone.
+// Examples are programs of users, so they may include only the public header.
 TEST(HouseRules, NothingIncludesTheInterfaceButItselfAndTests) {
   for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
     const bool example = is_in(file, "interface/examples");

@@ -143,8 +143,8 @@ TEST_F(CompareMeasured, AnyRateAndGaps) {
   EXPECT_THAT(result.notes[0], testing::HasSubstr("1 gap"));
 }
 
-// A recorded handover of a hand-held object. In the scene no surface is touched, so the error is the measured
-// force.
+// A recorded handover of a hand-held object. The tool touches nothing in the scene, so the error is the
+// measured force.
 TEST_F(CompareMeasured, ARealWrenchIsRead) {
   const auto folder = tests::shared_data("data/trajectories");
   SKIP_WITHOUT(folder);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recorded session replays bit for bit; a damaged file is refused or detected.
+// A recorded session replays bit for bit. A damaged file is refused or detected.
 #include "hybrid/session/recording.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
@@ -123,7 +123,7 @@ TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
   }
 }
 
-// `run --device`: the ideal device has neither passivity nor a limit of energy.
+// As with `run --device`. The ideal device has neither passivity control nor a limit on energy.
 TEST_F(RecordingFile, TheReplayHasTheDeviceThatWasUsedNotTheScenes) {
   using enum device::DeviceModel;
   struct Case {

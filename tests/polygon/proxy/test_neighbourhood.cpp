@@ -57,7 +57,7 @@ TEST_P(NeighbourhoodTest, MissesNothingThatABallCouldTouchInIt) {
   }
 }
 
-// A point that violates no plane is clear of every element, and so is the straight step there.
+// A point that violates no plane is clear of every element. So is the straight path to this point.
 TEST_P(NeighbourhoodTest, WhatBreaksNoPlaneIsClear) {
   Neighbourhood near;
   int clear = 0;

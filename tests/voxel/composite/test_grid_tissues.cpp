@@ -146,7 +146,7 @@ TEST(CompositeGrid, PatchesInSeveralTissues) {
   EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, core), patch), 0.04);
 }
 
-// The lattice's limits are those of its voxels, a coarse level's are means over the tissue round its nodes.
+// The lattice has the limits of its voxels. A coarse level has means over the tissue around its nodes.
 TEST(CompositeGrid, PatchesInTissuesWithLimitsOfTheirOwn) {
   const int n = 64;
   const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};

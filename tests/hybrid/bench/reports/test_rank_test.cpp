@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rank test against all permutations, and its approximation against the exact test. Also tests how often
-// two samples of the same distribution are called different.
+// The rank test against all permutations, and its approximation against the exact test. The rate of false
+// alarms on samples of the same distribution is tested too.
 #include "hybrid/bench/reports/rank_test.h"
 
 #include <gtest/gtest.h>
