@@ -264,7 +264,7 @@ TEST(HouseRules, HeavyLibrariesStayInFewFilesAndOutOfHeaders) {
     std::string list;
     for (const std::string& file : files) list += "\n  " + file;
     // CGAL may be in more files, because it also serves as the exact reference and as the tree in common use.
-    // ImGui is in two rooms: it draws the text of pictures and the window's panel.
+    // ImGui is in two rooms, because it draws the text of pictures and the window's panel.
     const std::size_t most = library == "CGAL/" ? 5 : library == "imgui" ? 3 : 2;
     EXPECT_LE(files.size(), most) << library << " is included in more than " << most << " files:" << list;
   }

@@ -74,7 +74,7 @@ as_user "zcat /usr/share/man/man1/hybrid.1.gz | grep -q 'SS hybrid run'; source 
 
 echo '== purge'
 apt purge hybrid 'libhybrid*' python3-hybrid
-# By default apt keeps what another package recommends or suggests.
+# By default apt keeps packages that another package recommends or suggests.
 apt autoremove --purge -o APT::AutoRemove::RecommendsImportant=false -o APT::AutoRemove::SuggestsImportant=false
 rm -rf -- "$root/tmp/user"
 files >"$folder/after.txt"

@@ -149,7 +149,7 @@ TEST(RowFields, ThousandSeparatorsAndDecimalCommasAreToldApart) {
               AllOf(HasSubstr("a file.csv:2: '10,000'"), HasSubstr("thousands")));
   EXPECT_THAT(tests::path_refusal("t_s;x_mm;y_mm;z_mm\n0,5;10;20;30\n0.75;10;20;30\n"),
               HasSubstr("decimal comma"));
-  // A column of text does not decide on the decimal mark.
+  // A column of text does not affect the choice of the decimal mark.
   EXPECT_EQ(tests::path_of("note;t_s;x_mm;y_mm;z_mm\n0,5;0.5;1.5;2;3\n").position_m[0],
             1e-3 * glm::dvec3(1.5, 2, 3));
 }

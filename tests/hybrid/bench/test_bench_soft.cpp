@@ -57,7 +57,7 @@ TEST(BenchSoft, WavesOfTheProductAreExactAndThoseOfAHomogeneousBlockAreOctahedra
       EXPECT_EQ(*row.violated, 0U);
       EXPECT_TRUE(*row.exact);
     }
-    // Rows with a note are excluded: their hundred pushes reach the side of the block.
+    // Rows with a note are excluded, because their hundred pushes reach the side of the block.
     if (row.material == "homogeneous" && row.note.empty()) {
       EXPECT_EQ(*row.moved, octahedron(*row.depth_spacings / *row.slack));
     }

@@ -184,7 +184,7 @@ in_mode() {
     tune)
       long_mode 5 "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json \
         --report out/page
-      # The cache is still usable: the same command must complete.
+      # The cache is still usable, so the same command must complete.
       "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json > run.log 2>&1 ||
         fail "tune does not go on: $(tail -n 3 run.log)"
       check_files "tune, not killed" TERM

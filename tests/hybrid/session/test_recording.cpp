@@ -437,7 +437,7 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
   std::string cut_name = bytes;
   cut_name[104] = '\0';
   EXPECT_NE(refusal_of(cut_name).find("damaged name of its scene"), std::string::npos);
-  // Values of a tick that no session writes: its fault and its share of work.
+  // A tick with values that no session writes, for its fault and for its share of work.
   const std::size_t last_tick = bytes.size() - 48;
   for (const std::size_t field : {std::size_t{32}, std::size_t{33}, std::size_t{36}, std::size_t{37}}) {
     std::string wrong = bytes;

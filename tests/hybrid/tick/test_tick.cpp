@@ -71,7 +71,7 @@ TEST_P(Energy, AClosedLoopOverTheBorderGivesTheHandNothing) {
                                      {-x, -2 * way, z},
                                      {-x, -2 * way, 15}}};
     touch.go(1e-3 * loop[0], 5e-6);
-    double work = 0.0, most = 0.0;  // J, gained by the hand; N
+    double work = 0.0, most = 0.0;  // energy gained by the hand (J); largest force (N)
     dvec3 before_m = touch.state().device_m, before_N(0.0);
     for (const dvec3& to : loop) {
       touch.go(1e-3 * to, 5e-6, 0, [&](const TickResult& felt) {  // 5 mm/s

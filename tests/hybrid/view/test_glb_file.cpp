@@ -71,7 +71,7 @@ std::vector<glm::dvec3> read_vectors(const json& gltf, const std::string& binary
   return out;
 }
 
-// The bounds that an accessor of positions states are those of its values.
+// An accessor of positions must state the bounds of its values.
 void expect_bounds(const json& accessor, const std::vector<glm::dvec3>& points) {
   for (int a = 0; a < 3; ++a) {
     const auto axis = static_cast<std::size_t>(a);

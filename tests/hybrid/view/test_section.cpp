@@ -36,7 +36,7 @@ Session cored() {
   s.now.force_N = {0.0, 0.0, 1.0};
   s.now.feel = {{true, 1.0}};
   s.now.inside.resize(1);
-  s.now.inside[0].used = true;  // no displacements: the block is at rest
+  s.now.inside[0].used = true;  // without displacements, the block is at rest
   return s;
 }
 

@@ -29,7 +29,7 @@ std::string gel(double radius_mm, double thickness_mm, const Limits& limits) {
 
 class TissueFacets : public tests::SceneFile {};
 
-// The surface of a block at rest is known: it is the box of its voxel centres, grown by half a spacing.
+// The surface of a block at rest is the box of its voxel centres, grown by half a spacing.
 TEST_F(TissueFacets, OfABlockAtRestAreItsFaces) {
   tests::Touch touch(load(gel(2.0, 20.0, {0.5, 1.5, 0.5})), {0.0, 0.0, 0.013});
   touch.at({0.0, 0.0, 0.01205});  // near enough to list voxels, without touching any
