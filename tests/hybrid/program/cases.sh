@@ -200,7 +200,8 @@ held() {
   failures=$((failures + 1))
 }
 tissue=$cases/tissue
-# gel10: the held force stays until the tool leaves, at any spacing and radius.
+# press NAME FROM_S TO_S LEAST_N MOST_N: plays NAME.toml and checks the held force. In gel10 this force must stay until
+# the tool leaves, at any spacing and radius.
 press() {
   says "$1" "ticks of 1 ms" run "$1.toml" --samples 0 --trace "$1.csv"
   held "$1.csv" "$2" "$3" "$4" "$5" "$1: the held force"

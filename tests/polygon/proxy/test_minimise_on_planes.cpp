@@ -98,8 +98,7 @@ std::optional<dvec3> on_subset(const dvec3& target, const dmat3& metric,
   return q;
 }
 
-// The least cost over all subsets whose minimum violates no plane by more than `allowed`. Empty if there is
-// none.
+// The cheapest of the subsets' minima that violate no plane by more than `allowed`. Empty if there is none.
 std::optional<dvec3> brute_force(const dvec3& target, const dmat3& metric,
                                  const std::vector<ContactPlane>& planes, double allowed) {
   std::optional<dvec3> best;
