@@ -35,7 +35,7 @@ stage() {
   if [[ -n $hybrid_stage_name ]]; then say "== $hybrid_stage_name"; fi
 }
 
-# read_options WHAT-THE-SCRIPT-DOES ARGUMENTS…
+# read_options PURPOSE ARGUMENTS…: reads the options of the script. PURPOSE is a line of its help.
 read_options() {
   local purpose=$1 argument
   shift
@@ -67,13 +67,13 @@ usage() {
   say "$line"
 }
 
-# given FLAG: was the script called with it?
+# given FLAG: whether the script was called with this flag.
 given() { [[ $hybrid_given == *" $1 "* ]]; }
 
-# The packages of packages.txt, one a line.
+# Prints the packages of packages.txt, one per line.
 listed_packages() { sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' -- "$hybrid_root/packages.txt"; }
 
-# The listed packages that are not installed.
+# Prints the listed packages that are not installed.
 missing_packages() {
   local installed
   installed=$(dpkg-query --show --showformat='${db:Status-Status} ${Package}\n' | sed -n 's/^installed //p')
@@ -103,7 +103,7 @@ install_packages() {
       refuse 'packages are missing, and installing them needs root; there is no sudo here.' \
         "As root, run: $by_hand" 'and start this script again.'
     as_root=(sudo)
-    # Without a terminal there is nobody to type a password.
+    # Without a terminal nobody can type a password, so sudo must not ask for one.
     if [[ ! -t 0 ]]; then as_root=(sudo -n); fi
     "${as_root[@]}" true || refuse 'packages are missing, and sudo did not allow installing them.' \
       "As root, run: $by_hand" 'and start this script again.'

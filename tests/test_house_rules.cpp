@@ -326,8 +326,8 @@ std::string_view declared_by(std::string_view line) {
   return line.substr(line.rfind(':') + 1);
 }
 
-// clang-tidy's check of this does not look into the batches of tests/tidy.sh. A header may declare names for
-// those who include it.
+// clang-tidy's check for unused using-declarations does not look into the batches of tests/tidy.sh. A header
+// may declare names for those who include it.
 TEST(HouseRules, EachUsingDeclarationIsUsed) {
   for (const SourceFile& file : tree()) {
     if (!is_cpp(file) || is_header(file)) continue;

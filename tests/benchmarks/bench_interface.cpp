@@ -29,7 +29,7 @@
 namespace {
 
 constexpr int kTicks = 1000;        // in each round
-constexpr double kPeriod_s = 1e-3;  // of a tick
+constexpr double kPeriod_s = 1e-3;  // length of a tick
 constexpr const char* kScene =
     "format = 1\n[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 20\n"
     "[path]\nkind = \"press\"\nfrom = [0, 0, 40]\nto = [0, 0, 10]\n";

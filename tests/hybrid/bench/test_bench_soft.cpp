@@ -91,8 +91,8 @@ TEST(BenchSoft, SessionsAndLoadsSayWhatTheyAre) {
   EXPECT_TRUE(rows[1].force_error_N && rows[1].force_error_jnd && rows[1].truncated_share);
 }
 
-// Thesis, Fig 22: if both links of a corner move it, the corner oscillates for ever. The project's own tissue
-// comes to rest at once.
+// Thesis, Fig 22. A corner that is moved by each of its two links oscillates for ever. The project's own
+// tissue comes to rest at once.
 TEST(BenchSoft, ClassicOscillatesForEverAndOursSettles) {
   const auto objects = hybrid::bench::measure_settling(60);
   ASSERT_EQ(objects.size(), 2U);

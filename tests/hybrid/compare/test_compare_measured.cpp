@@ -103,7 +103,7 @@ TEST_F(CompareMeasured, ForcesOnTheObjectAreNoticedAndTurned) {
   EXPECT_LT(turned.rms_N, 1e-6);
 }
 
-// The evaluation's pipeline: forces are measured on the surface. A separate file without forces, the
+// As in the haptic rendering evaluation, forces are measured on the surface. A separate file without forces, the
 // in-trajectory, drives the device below the surface by force / stiffness.
 TEST_F(CompareMeasured, AnInTrajectoryDrivesTheDevice) {
   std::string raw = "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N\n", in = "t_s,x_mm,y_mm,z_mm\n";

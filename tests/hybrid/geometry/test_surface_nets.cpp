@@ -149,7 +149,7 @@ double rms_off_ball(const TriangleMesh& mesh, const ScannedBall& scan, double ra
   return std::sqrt(sum / static_cast<double>(mesh.vertices.size()));
 }
 
-// Smoothed labels are off by more than this bound.
+// Surfaces of smoothed labels exceed this bound.
 TEST(IntensitySurface, IsWithinATenthOfASpacingOfTheBall) {
   constexpr double kAllowed = 0.1;
   const auto infinite = std::numeric_limits<double>::infinity();

@@ -33,7 +33,7 @@ using tests::Touch;
 struct Stroke {
   std::vector<dvec3> points_mm;
   std::vector<Face> fronts{};  // faces in front of which the tool's centre must stay
-  // The common bounds. A case may state wider ones, with the reason beside it.
+  // The common bounds. A case may state wider bounds, with the reason beside them.
   double deepest = 0.05;   // spacings
   std::size_t passed = 0;  // number of voxels in a solid, summed over the ticks
 };

@@ -136,7 +136,7 @@ TEST(FreeBody, PrecessesAtTheRateOfTheTop) {
   EXPECT_LE(glm::distance(state.rotation * axis, expected), 1e-5);
 }
 
-// A springy floor that pushes each corner of a body which is below it, and never pulls.
+// A springy floor. It pushes each corner of a body that is below the floor, and never pulls.
 struct Springs {
   dvec3 half_size{0.005};
   double floor_m = 0.0;  // z

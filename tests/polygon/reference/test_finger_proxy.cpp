@@ -193,7 +193,7 @@ TEST(FingerProxy, AtABoxItEndsAtTheClosestPoint) {
   const TriangleTree tree(box_mesh());
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> part(0.1, 0.8);
-  for (int feature = 1; feature <= 3; ++feature) {  // axes along which the goal lies beyond the box
+  for (int feature = 1; feature <= 3; ++feature) {  // number of axes on which the goal is outside the box
     for (int n = 0; n < 300; ++n) {
       dvec3 goal = random_in_cube(random, 0.9 * kHalf_m);
       for (int axis = 0; axis < feature; ++axis) goal[axis] = kHalf_m + part(random) * 0.5 * kBall_m;

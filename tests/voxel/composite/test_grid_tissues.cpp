@@ -25,7 +25,8 @@ using voxel::LinkMaterial;
 using Index3 = CompositeGrid::Index3;
 
 // Layers and lumps of tissues whose stiffnesses differ by factors of 4 to 200. Soft layers between stiff ones
-// reach their limits. The depth is a fraction of that at which all links below the square do so.
+// reach their limits. The depth is a fraction of the depth at which all links below the
+// square reach their limits.
 int stiff_soft_stiff(const Index3& p) {
   return p[2] < 4 || p[2] >= 9 ? 4 : 1;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A test double of libHD: a complete device behind the driver's C interface, with its own scheduler thread. A
-// test loads the same library file as the program and finds `fake_hd` in it. It writes the events that shall
-// happen into that struct.
+// test loads the same library file as the program and finds `fake_hd` in it. The test writes the events that
+// shall happen into this struct.
 #pragma once
 
 #include <atomic>

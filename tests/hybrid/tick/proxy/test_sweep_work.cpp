@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The work of a sweep is bounded on any mesh and at any speed. A sweep that the bound ends leaves the proxy
-// outside everything, and later sweeps take it to the same place.
+// outside all objects, and later sweeps take it to its optimum.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -128,7 +128,7 @@ TEST_P(SweepWork, LandsWithFewElements) {
     }
     ASSERT_GT(ball_.state().active_count, 0U);
   }
-  // In units of elements listed. A ball of 2 mm touches many triangles of the finest mesh at once.
+  // The unit of work is a listed element. A ball of 2 mm touches many triangles of the finest mesh at once.
   EXPECT_LE(most, (std::get<1>(GetParam()) > 0.0 ? 2 : 1) * Neighbourhood::kCapacity);
 }
 
