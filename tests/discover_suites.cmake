@@ -7,7 +7,7 @@ if(SLOW)
 endif()
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests "--gtest_filter=${but_slow}" OUTPUT_VARIABLE listed
                 COMMAND_ERROR_IS_FATAL ANY TIMEOUT 60)
-string(REGEX REPLACE "[][;]" "_" listed "${listed}") # remarks on parameters have them, and CMake would split lists there
+string(REGEX REPLACE "[][;]" "_" listed "${listed}") # would split CMake's lists in GoogleTest's remarks
 string(REPLACE "\n" ";" lines "${listed}")
 
 # A suite counts as skipped if a case was skipped and none failed. GoogleTest lists the skipped cases last.

@@ -54,7 +54,7 @@ TEST(SurfacePlaces, CoverASurfaceEvenlyHoweverManyThereAre) {
   }
   EXPECT_LE(places.gap_m(), 2e-3);
   // Discs of 2 mm radius around the places cover the sheets, which bounds their number from below. Discs of
-  // half this radius do not overlap and stay within a rim of 1 mm, which bounds it from above.
+  // half this radius do not overlap and stay within a rim of 1 mm, which bounds the number from above.
   EXPECT_GT(given.size(), 2U * 400U / 13U);
   EXPECT_LT(given.size(), 2U * 484U / 3U);
   double area_m2 = 0.0;
@@ -97,7 +97,7 @@ TEST(SurfacePlaces, KeepWhatIsNotKnown) {
     }
   }
   EXPECT_TRUE(std::isnan(spread.back()));
-  // A single place is enough to spread from.
+  // Values of a single place can be spread too.
   SurfacePlaces few(mesh, 4e-3);
   (void)few.next(0.0);
   const std::vector<float> one{3.0F};

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# stop.sh PROGRAM SCENES FOLDER: signals end a session properly. All requested files are written, and cover the ticks that were
-# played.
+# stop.sh PROGRAM SCENES FOLDER: signals end a session properly. All requested files are written, and cover the
+# ticks that were played.
 set -u
 program=$1 scenes=$2 folder=$3
 failures=0

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# window.sh PROGRAM FOLDER SCENE...: simulates a user with mouse and keys in the window of each scene. The session must end
-# well, the driver report no error, every picture be written, and the recording replay. $PAUSE_S: seconds between two
+# window.sh PROGRAM FOLDER SCENE...: simulates a user with mouse and keys in the window of each scene. The session must
+# end well, the driver report no error, every picture be written, and the recording replay. $PAUSE_S: seconds between two
 # actions (0.15). Without Xvfb and xdotool, the test is skipped.
 set -u
 program=$1 folder=$2

@@ -107,7 +107,7 @@ TEST_F(LiveReferenceOf, TissueTakesEdits) {
       .tick = 0, .object = 1, .quantity = hybrid::EditedQuantity::tissue_factor, .value = 2.0};
   ASSERT_TRUE(hybrid::apply_edit(touch.world(), touch.state(), twice));
   reference.edited(twice);
-  // Plays the path up to the stop. The tool then stays until an answer says that it is felt as at rest.
+  // Plays the path up to the stop. The tool then stays until an answer says that the force is that at rest.
   std::vector<hybrid::PassedTick> passed = play(touch, {at.begin(), at.end() - 30});
   for (const hybrid::PassedTick& tick : passed) reference.passed(tick);
   hybrid::PassedTick last = passed.back();

@@ -121,8 +121,8 @@ TEST(ForceErrorOfScenes, FullAlsoFindsTheErrorOfPatches) {
 }
 
 // While the device is still, the quick reference may stop being slow, but not before the tissue is at rest.
-// In the course of this test, the hand feels the force of the equilibrium during the whole hold. So any error
-// found is that of the reference itself.
+// Here the course has the force of the equilibrium during the whole hold. So any error found is that of the
+// reference itself.
 TEST_F(ForceErrorOfRun, DoesNotRestTooEarly) {
   const hybrid::Scene scene = load(beside_a_ball(100.0));
   // The device arrives after 0.1 s, and holds until 0.5 s.

@@ -228,7 +228,7 @@ TEST(CompositeGrid, TheTrialFindsTheErrorOfThinParts) {
   constexpr int kDim = 40, kCycles = 60;
   constexpr double kDepth = 0.04 * kSpacing;
   constexpr double kScale = 0.1 * kDim * kSpacing / kDepth;  // scales a force to the trial's press
-  constexpr double kLeast_N = 0.57;                          // errors are relative to the force or this
+  constexpr double kLeast_N = 0.57;                          // errors are relative to this force at least
   using Filled = std::function<bool(const Index3&)>;
   const Filled fins = [](const Index3& p) { return p[2] < 20 || p[0] % 4 == 0; };
   const Filled rods = [](const Index3& p) { return p[2] < 24 || (p[0] % 6 == 3 && p[1] % 6 == 3); };
