@@ -340,7 +340,7 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
     worst = std::max(worst, unbalanced(felt.proxy_m - felt.device_m, normals));
   }
   EXPECT_LE(worst, 1e-6);         // the proxy is within a micrometer of its minimum
-  EXPECT_GE(nearest, r - 1e-11);  // and never nearer to a triangle than r
+  EXPECT_GE(nearest, r - 1e-11);  // the proxy is never nearer to a triangle than r
   EXPECT_EQ(touch.state().truncated_ticks, 0U);
   RecordProperty("worst_m", std::to_string(worst));
   std::printf(
