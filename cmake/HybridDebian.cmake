@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The Debian packages that `cpack` makes of the four components of HybridInstall.cmake, one of each.
+# `cpack` makes one Debian package of each of the four components of HybridInstall.cmake.
 
 set(packages "hybrid;libhybrid${HYBRID_ABI_VERSION};libhybrid-dev;python3-hybrid")
 set(components "program;library;development;python")
@@ -46,7 +46,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
 
-# Pictures need OpenGL, which is loaded at run time, and a font; scenes/head.toml needs the head of mricron-data.
+# Pictures need OpenGL, which is loaded at run time, and a font. scenes/head.toml needs the head of mricron-data.
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libegl1, libgl1-mesa-dri, fonts-dejavu-core, mricron-data")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "python3-hybrid")
 set(of_this_build "libhybrid${HYBRID_ABI_VERSION} (= ${PROJECT_VERSION})")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What `cmake --install` installs, in four components. HybridDebian.cmake makes a Debian package of each.
+# Rules of `cmake --install`, in four components. HybridDebian.cmake makes a Debian package of each component.
 include(CMakePackageConfigHelpers)
 
 set(HYBRID_PYTHON_DIR "lib/python3/dist-packages" CACHE STRING "Where the Python module is installed, below the prefix")
@@ -19,14 +19,14 @@ install(EXPORT hybrid-targets FILE hybrid-config.cmake NAMESPACE hybrid:: DESTIN
 write_basic_package_version_file(hybrid-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/hybrid-config-version.cmake DESTINATION ${package_dir} COMPONENT development)
 
-# pkg-config hybrid. The prefix is told from the place of the file, so that an installed tree may be moved.
+# The file for `pkg-config hybrid`. Its prefix is relative to its own place, so an installed tree may be moved.
 set(pkgconfig_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 file(RELATIVE_PATH to_prefix /prefix/${pkgconfig_dir} /prefix)
 string(REGEX REPLACE "/$" "" to_prefix "${to_prefix}")
 configure_file(cmake/hybrid.pc.in hybrid.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/hybrid.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
 
-# hybrid_gzip(FILE NAME): compresses the file in every build. -n: no time in it, so that equal builds give equal bytes.
+# hybrid_gzip(FILE NAME): compresses the file in every build. -n stores no time, so equal builds give equal bytes.
 function(hybrid_gzip file name)
   add_custom_command(OUTPUT ${name} COMMAND gzip -9nc "${file}" > ${name} DEPENDS "${file}" VERBATIM)
   string(REPLACE "." "_" target compressed_${name})

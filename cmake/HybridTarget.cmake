@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What every target of this project shares: the language, the warnings, and reproducible arithmetic.
+# Settings that all targets share: the language, the warnings, and reproducible arithmetic.
 
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(HYBRID_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. address,undefined")
 
-# The widest vectors of this machine, for sanitized builds: they cannot pick a width at start-up (simd_dispatch.h).
+# Finds the widest vectors of this machine for sanitized builds, which cannot choose a width at start-up (simd_dispatch.h).
 if(HYBRID_SANITIZE)
   include(CheckCXXSourceRuns)
   check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") ? 0 : 1; }" HYBRID_HAS_AVX2)
@@ -18,14 +18,14 @@ function(hybrid_target name)
   target_compile_features(${name} PUBLIC cxx_std_20)
   set_target_properties(${name} PROPERTIES CXX_EXTENSIONS OFF)
   target_include_directories(${name} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>")
-  # -Wno-restrict, -Wno-array-bounds, -Wno-stringop-overflow: g++ 12 sees overlap and overflow in `"literal" + std::string` where
-  # there is none (GCC bug 105651). Precompiled headers make it report what it sees inside the standard library.
+  # -Wno-restrict, -Wno-array-bounds, -Wno-stringop-overflow: g++ 12 wrongly reports overlap and overflow in
+  # `"literal" + std::string` (GCC bug 105651). With precompiled headers it also reports them inside the standard library.
   target_compile_options(${name} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wno-restrict
                                          -Wno-array-bounds -Wno-stringop-overflow -Werror -ffp-contract=off)
-  # In a batch g++ takes a source for a header, whose types may not hold those of an anonymous namespace.
+  # In a batch, g++ takes each source for a header, and warns about types with members from an anonymous namespace.
   target_compile_options(${name} PRIVATE $<$<BOOL:${CMAKE_UNITY_BUILD}>:-Wno-subobject-linkage>)
   if(HYBRID_SANITIZE)
-    # g++ 12 takes checked members of std::regex for uninitialised.
+    # With sanitizers, g++ 12 wrongly reports uninitialised members of std::regex.
     target_compile_options(${name} PRIVATE -Wno-maybe-uninitialized)
     target_compile_options(${name} PUBLIC -fsanitize=${HYBRID_SANITIZE} -fno-omit-frame-pointer
                                           -fno-sanitize-recover=all)
@@ -35,14 +35,14 @@ function(hybrid_target name)
   endif()
 endfunction()
 
-# hybrid_shareable(NAME): code that a shared library may hold. Without -fno-semantic-interposition g++ would inline no function
-# that another library might replace, which none does.
+# hybrid_shareable(NAME): code that a shared library may hold. No other library replaces its functions, and
+# -fno-semantic-interposition tells g++ so. Otherwise g++ would not inline them.
 function(hybrid_shareable name)
   target_compile_options(${name} PRIVATE -fPIC -fno-semantic-interposition)
 endfunction()
 
-# hybrid_headers(NAME HEADERS… LINKS …): headers that many rooms include, compiled once; rooms reuse them by name. A source still
-# names each header that it uses: CMAKE_DISABLE_PRECOMPILE_HEADERS builds without them.
+# hybrid_headers(NAME HEADERS… LINKS …): precompiles headers that many rooms include. Rooms reuse them by NAME. A source still
+# includes each header that it uses, because CMAKE_DISABLE_PRECOMPILE_HEADERS builds without them.
 function(hybrid_headers name)
   cmake_parse_arguments(arg "" "" "HEADERS;LINKS" ${ARGN})
   file(GENERATE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp CONTENT "// Holds the precompiled headers ${name}.\n")
@@ -54,11 +54,11 @@ function(hybrid_headers name)
 endfunction()
 
 # The release preset compiles the sources of a room in batches (CMAKE_UNITY_BUILD), which halves the time to build. So a name in
-# an anonymous namespace is unique within its room. The other presets compile each source by itself.
+# an anonymous namespace must be unique within its room. The other presets compile each source by itself.
 #
 # hybrid_room(PART/ROOM SOURCES … LINKS … PRIVATE_LINKS … HEADERS NAME): the library of one folder, called hybrid::PART_ROOM, or
-# hybrid::ROOM where the part is hybrid itself. LINKS are rooms that its headers include; PRIVATE_LINKS are libraries of its
-# sources alone; HEADERS are precompiled ones. COLD: nothing in it runs in a tick or is timed, so it is compiled with -O1.
+# hybrid::ROOM where the part is hybrid itself. LINKS: rooms that its headers include. PRIVATE_LINKS: libraries that only its
+# sources use. HEADERS: precompiled headers. COLD: none of its code runs in a tick or is timed, so -O1 is enough.
 function(hybrid_room path)
   cmake_parse_arguments(arg "COLD" "HEADERS" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   string(REGEX REPLACE "^[a-z]+/(.*)$" "\\1" folder "${path}")

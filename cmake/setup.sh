@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # shellcheck shell=bash
-# What the demo and the tests do first: install missing Debian packages, configure, build. Sourced by both.
-# Needs no network, and changes nothing, when everything is there.
+# The demo and the tests source this file. It installs missing Debian packages, configures and builds.
+# If everything is there, it needs no network and changes nothing.
 
 set -euo pipefail
 
@@ -17,7 +17,7 @@ hybrid_stage_start=0
 
 say() { printf '%s\n' "$*"; }
 
-# refuse WHAT REMEDY…: said on standard error; ends the script.
+# refuse WHAT REMEDY…: prints both on standard error, and ends the script.
 refuse() {
   printf '\nerror: %s\n' "$1" >&2
   shift
@@ -25,7 +25,7 @@ refuse() {
   exit 1
 }
 
-# stage NAME: ends the stage before with its time, and begins NAME. Without a name, only ends.
+# stage [NAME]: ends the present stage and prints its time, then begins NAME. Without a name, no stage begins.
 stage() {
   if [[ -n $hybrid_stage_name ]]; then
     say "== $hybrid_stage_name: done in $((SECONDS - hybrid_stage_start)) s"
@@ -35,7 +35,7 @@ stage() {
   if [[ -n $hybrid_stage_name ]]; then say "== $hybrid_stage_name"; fi
 }
 
-# read_options WHAT-THE-SCRIPT-DOES ARGUMENTS…
+# read_options PURPOSE ARGUMENTS…: reads the options of the script. PURPOSE is a line of its help.
 read_options() {
   local purpose=$1 argument
   shift
@@ -67,13 +67,13 @@ usage() {
   say "$line"
 }
 
-# given FLAG: was the script called with it?
+# given FLAG: whether the script was called with this flag.
 given() { [[ $hybrid_given == *" $1 "* ]]; }
 
-# The packages of packages.txt, one a line.
+# Prints the packages of packages.txt, one per line.
 listed_packages() { sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' -- "$hybrid_root/packages.txt"; }
 
-# Those of them that are not installed.
+# Prints the listed packages that are not installed.
 missing_packages() {
   local installed
   installed=$(dpkg-query --show --showformat='${db:Status-Status} ${Package}\n' | sed -n 's/^installed //p')
@@ -103,7 +103,7 @@ install_packages() {
       refuse 'packages are missing, and installing them needs root; there is no sudo here.' \
         "As root, run: $by_hand" 'and start this script again.'
     as_root=(sudo)
-    # Without a terminal there is nobody to type a password.
+    # Without a terminal nobody can type a password, so sudo must not ask for one.
     if [[ ! -t 0 ]]; then as_root=(sudo -n); fi
     "${as_root[@]}" true || refuse 'packages are missing, and sudo did not allow installing them.' \
       "As root, run: $by_hand" 'and start this script again.'
@@ -111,7 +111,7 @@ install_packages() {
   local -a apt=(env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o Dpkg::Use-Pty=0 -o DPkg::Lock::Timeout=300)
   "${as_root[@]}" "${apt[@]}" update ||
     refuse 'the lists of packages could not be fetched.' 'Is there a network? Then start this script again.'
-  # Unpacking some hundred packages says two lines each: kept, and shown only when something goes wrong.
+  # apt prints two lines for each of some hundred packages. They go to a log, which is shown only after a failure.
   local log
   log=$(mktemp)
   if ! "${as_root[@]}" "${apt[@]}" install --no-install-recommends "${missing[@]}" >"$log" 2>&1; then
@@ -123,7 +123,7 @@ install_packages() {
   rm -f -- "$log"
 }
 
-# How many compilers at once: one a processor, and 1.5 GB of memory for each (CGAL and ITK take that much).
+# Number of parallel compilers: at most one per processor and per 1.5 GB of memory (CGAL and ITK take that much).
 build_jobs() {
   local processors memory_kb jobs
   processors=$(nproc)
@@ -134,20 +134,20 @@ build_jobs() {
   printf '%s\n' "$jobs"
 }
 
-# True when the build folder was made by this checkout, where it lies now. ninja itself sees to changed build files.
+# True if the build folder was configured for this checkout at its present path. ninja itself notices changed files.
 is_configured() {
   local cache=$1/CMakeCache.txt
   [[ -f $1/build.ninja && -f $cache ]] && grep -Fxq "CMAKE_HOME_DIRECTORY:INTERNAL=$hybrid_root" "$cache"
 }
 
-# build TARGET: makes build/release/… of that target, saying nothing when it is up to date.
+# build TARGET: builds the target in build/release. Prints nothing if it is up to date.
 build() {
   local target=$1 folder=$hybrid_root/build/release
   command -v cmake >/dev/null || refuse 'cmake is missing.' 'packages.txt lists what is needed to build.'
   command -v ninja >/dev/null || refuse 'ninja is missing.' 'packages.txt lists what is needed to build.'
   if ! is_configured "$folder"; then
     stage 'configure'
-    # A folder that was copied from elsewhere is begun again; CMake would refuse it.
+    # CMake refuses a build folder that was copied from elsewhere, so the folder is configured anew.
     local -a fresh=()
     if [[ -f $folder/CMakeCache.txt ]]; then fresh=(--fresh); fi
     (cd -- "$hybrid_root" && cmake "${fresh[@]}" --preset release) ||

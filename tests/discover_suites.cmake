@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Writes OUT, a file of ctest's with one test for each suite of PROGRAM: NAME.SUITE, with the label `fast`. Its cases are those
-# that no pattern of SLOW names, and that are not disabled. LIMIT_S: the time limit of each test (s).
+# Writes the file OUT for ctest. For each suite of PROGRAM it has a test NAME.SUITE with the label `fast`. This test runs the
+# cases of the suite that match no pattern of SLOW and are not disabled. LIMIT_S: the time limit of each test (s).
 set(but_slow "*")
 if(SLOW)
   set(but_slow "-${SLOW}")
 endif()
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests "--gtest_filter=${but_slow}" OUTPUT_VARIABLE listed
                 COMMAND_ERROR_IS_FATAL ANY TIMEOUT 60)
-string(REGEX REPLACE "[][;]" "_" listed "${listed}") # of parameters in remarks; they would divide lists
+string(REGEX REPLACE "[][;]" "_" listed "${listed}") # would split CMake's lists in GoogleTest's remarks
 string(REPLACE "\n" ";" lines "${listed}")
 
-# A suite is skipped as a whole if a case was skipped and none failed: GoogleTest lists the skipped cases last.
+# A suite counts as skipped if a case was skipped and none failed. GoogleTest lists the skipped cases last.
 set(skipped "PASSED  . [0-9]+ tests?[.]\n.  SKIPPED . [0-9]+ tests?, listed below:\n(.  SKIPPED . [^\n]*\n?)+$")
 set(text "")
 set(suite "")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Precompiled header: the headers that nearly every test includes. A source still names each header that it
-// uses; this file only saves compiling them again.
+// uses. This file only saves compiling the headers again.
 #pragma once
 
 #include <gtest/gtest.h>

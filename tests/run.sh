@@ -19,6 +19,6 @@ if given --fast; then
   say "fast: $left_out tests are left out (label slow); bash tests/run.sh runs them all"
 fi
 
-# The last stage is begun but not ended: ctest has the last word.
+# The last stage has no end, because ctest replaces this script.
 stage "test (set-up took $SECONDS s)"
 exec ctest --test-dir "$tests" --output-on-failure --parallel 2 "${labels[@]}"

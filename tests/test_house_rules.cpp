@@ -229,7 +229,7 @@ TEST(HouseRules, OnlyInterfaceAndTestsIncludeHybridFromOutside) {
   });
 }
 
-// Examples are programs of users: they see the public header alone.
+// Examples are programs of users, so they may include only the public header.
 TEST(HouseRules, NothingIncludesTheInterfaceButItselfAndTests) {
   for_each_include([](const SourceFile& file, std::size_t line, const std::string& included) {
     const bool example = is_in(file, "interface/examples");
@@ -264,7 +264,7 @@ TEST(HouseRules, HeavyLibrariesStayInFewFilesAndOutOfHeaders) {
     std::string list;
     for (const std::string& file : files) list += "\n  " + file;
     // CGAL may be in more files, because it also serves as the exact reference and as the tree in common use.
-    // ImGui is in two rooms: it draws the text of pictures and the window's panel.
+    // ImGui is in two rooms, because it draws the text of pictures and the window's panel.
     const std::size_t most = library == "CGAL/" ? 5 : library == "imgui" ? 3 : 2;
     EXPECT_LE(files.size(), most) << library << " is included in more than " << most << " files:" << list;
   }
@@ -326,8 +326,8 @@ std::string_view declared_by(std::string_view line) {
   return line.substr(line.rfind(':') + 1);
 }
 
-// clang-tidy's check of this does not look into the batches of tests/tidy.sh. A header may declare names for
-// those who include it.
+// clang-tidy's check for unused using-declarations does not look into the batches of tests/tidy.sh. A header
+// may declare names for those who include it.
 TEST(HouseRules, EachUsingDeclarationIsUsed) {
   for (const SourceFile& file : tree()) {
     if (!is_cpp(file) || is_header(file)) continue;

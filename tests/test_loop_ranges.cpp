@@ -66,7 +66,7 @@ const std::set<std::string>& names_of_what_stays() {
   return names;
 }
 
-// In the range of a range-for, or in what a reference is bound to, finds a call whose result is destroyed
+// Finds a call in the range of a range-for, or in the initialiser of a reference. Its result is destroyed
 // before the loop begins, or at the end of the statement. Empty if there is none. C++20 keeps the range
 // itself alive, but not a temporary that contains the range, as in f()->notes().
 std::string lost_call(std::string_view range) {
@@ -112,7 +112,7 @@ std::string range_at(const SourceFile& file, std::size_t line, std::size_t at) {
   return "";
 }
 
-// What the reference that is declared in this line is bound to; empty if the line declares none.
+// The initialiser of the reference that this line declares; empty if the line declares none.
 std::string bound_at(const SourceFile& file, std::size_t line) {
   const std::string& text = file.lines[line];
   for (std::size_t at = text.find("& "); at != std::string::npos; at = text.find("& ", at + 1)) {

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Runs clang-tidy over the sources, in the batches of the build (CMAKE_UNITY_BUILD): a batch reads the headers that its
-# sources share once. Exit status 0: nothing was found.
+# Runs clang-tidy over the sources, in the batches of the build (CMAKE_UNITY_BUILD). A batch reads the headers that its
+# sources share only once. Exit status 0 means that nothing was found.
 #
 #     bash tests/tidy.sh                        # all sources
 #     bash tests/tidy.sh hybrid/tick tests/voxel/chain/test_wave.cpp    # only batches with sources whose paths begin so
-#     JOBS=1 bash tests/tidy.sh                 # one process (1.5 GB each); without it one for each core
+#     JOBS=1 bash tests/tidy.sh                 # one process (1.5 GB each); default: one for each core
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 root=$PWD
 readonly root build=build/lint
 
-# Without precompiled headers, which clang cannot read.
+# Configures without precompiled headers, because clang cannot read those of g++.
 cmake --preset debug -B "$build" -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON -D CMAKE_UNITY_BUILD=ON \
   -D CMAKE_UNITY_BUILD_BATCH_SIZE=16 >"$root/$build.log" 2>&1 || { cat "$root/$build.log" >&2; exit 2; }
 
@@ -23,7 +23,7 @@ sources_of() {
   esac | sed "s|^$root/||"
 }
 
-# The settings of the folder in which the first source lies: clang-tidy would look for them beside the batch.
+# The .clang-tidy for the folder of the first source. By itself, clang-tidy would look beside the batch's own file.
 settings_of() {
   local folder
   folder=$(dirname -- "$1")
@@ -35,7 +35,7 @@ lint() {
   local file=$1 sources flags=() first found
   sources=$(sources_of "$file")
   first=${sources%%$'\n'*}
-  # A batch includes sources.
+  # A batch consists of included sources.
   if [[ $file == */Unity/* ]]; then flags+=(--checks=-bugprone-suspicious-include); fi
   # ITK's headers accept only GNU compilers.
   # shellcheck disable=SC2086

@@ -3,9 +3,9 @@
 //
 //   bench_interface [--rounds N]     prints one row for each way to call a tick
 //
-// The scene is a rigid ball: its tick takes about a microsecond, so that it hides little of a call. The three
-// ways take turns. In each round every way plays the same path, in processor time of the thread. A row has
-// the least and the median of the rounds, and their ratios to those of direct ticks.
+// The scene is a rigid ball. Its tick takes only about a microsecond, so the time of a call is visible beside
+// it. The three ways take turns. In each round every way plays the same path. Times are processor time of the
+// thread. A row has the least and the median of the rounds, and their ratios to those of direct ticks.
 #include <hybrid.h>
 #include <time.h>  // NOLINT(modernize-deprecated-headers): clock_gettime() is POSIX
 
@@ -28,8 +28,8 @@
 
 namespace {
 
-constexpr int kTicks = 1000;        // of a round
-constexpr double kPeriod_s = 1e-3;  // of a tick
+constexpr int kTicks = 1000;        // in each round
+constexpr double kPeriod_s = 1e-3;  // length of a tick
 constexpr const char* kScene =
     "format = 1\n[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 20\n"
     "[path]\nkind = \"press\"\nfrom = [0, 0, 40]\nto = [0, 0, 10]\n";
@@ -52,7 +52,7 @@ std::vector<glm::dvec3> path_of(int round) {
   return path_m;
 }
 
-// One way to play a path: microseconds of a tick in each round.
+// One way to play a path, with its time per tick (µs) in each round.
 struct Way {
   const char* name;
   std::vector<double> round_us{};
@@ -99,7 +99,7 @@ class Interface {
     measure(ways[2],
             [&] { must(hybrid_play(session_, &path_m.front().x, path_m.size(), kPeriod_s, felt_.data())); });
   }
-  // 0 if both feel the same: the forces of direct ticks less those through the interface.
+  // Sum of the forces of direct ticks, minus that of the forces through the interface. 0 if all are equal.
   [[nodiscard]] double difference_N() const { return sum_N_; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session of the C interface, for tests: closes itself, and fails the test if a call fails.
+// A session of the C interface for tests. It closes itself, and fails the test if a call fails.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ class CSession {
     expect_ok(hybrid_tick(session_, &at_m.x, nullptr, info().period_s, &felt));
     return felt;
   }
-  // Ticks along the positions; returns all results.
+  // Ticks along the positions, and returns all results.
   [[nodiscard]] std::vector<hybrid_felt> play(std::span<const glm::dvec3> path_m) const {
     static_assert(sizeof(glm::dvec3) == 3 * sizeof(double));
     std::vector<hybrid_felt> felt(path_m.size());
@@ -85,7 +85,7 @@ inline glm::dvec3 vec(const double (&from)[3]) {
   return {from[0], from[1], from[2]};
 }
 
-// Positions on a straight way, the last one reached.
+// `count` positions on a straight line. The last one is `to_m`.
 inline std::vector<glm::dvec3> line(const glm::dvec3& from_m, const glm::dvec3& to_m, std::size_t count) {
   std::vector<glm::dvec3> places;
   for (std::size_t n = 1; n <= count; ++n)

@@ -3,7 +3,8 @@
 # debian_packages.sh BUILD FOLDER: makes the four Debian packages of a finished release build, checks them with lintian, and
 # installs them in a fresh Debian 12 below FOLDER. There it builds and runs programs through CMake, pkg-config and Python, and
 # the program itself, as an ordinary user. Then it purges the packages and compares the files before and after.
-# Needs root, the network, and the packages debootstrap and lintian: so it is not among the tests of ctest. Ten minutes, 2 GB.
+# It needs root, the network, and the packages debootstrap and lintian, so ctest does not run it. It takes up to ten
+# minutes and 2 GB.
 set -euo pipefail
 build=$(realpath -- "$1") folder=$(realpath -m -- "$2") here=$(cd -- "$(dirname -- "$0")" && pwd)
 
@@ -25,7 +26,7 @@ packages=("$folder"/packages/*.deb)
 ((${#packages[@]} == 4)) || fail "cpack made ${#packages[@]} packages, not 4"
 lintian --allow-root --fail-on error "${packages[@]}" || fail 'lintian finds errors in the packages'
 
-# The root is made once; a later call begins from its copy.
+# debootstrap runs once. Each call begins from a copy of its result.
 root=$folder/root
 if [[ ! -f $folder/clean.tar ]]; then
   echo '== a fresh Debian 12'
@@ -43,14 +44,14 @@ trap 'umount "$root/proc"' EXIT
 inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
 as_user() { chroot --userspec=nobody:nogroup "$root" env -i PATH=/usr/bin:/bin HOME=/tmp LC_ALL=C.UTF-8 bash -ec "cd /tmp/user; $1"; }
 apt() { inside apt-get -q -y "$@" >>"$folder/apt.log" 2>&1 || fail "apt-get $*: $folder/apt.log"; }
-# What belongs to packages, without the records of apt and dpkg themselves.
+# Lists the files of the root, without temporary files and without the records of apt and dpkg.
 files() { (cd -- "$root" && find . \( -path ./proc -o -path ./tmp -o -path ./packages -o -path ./var/cache -o -path ./var/log \
   -o -path ./var/lib/apt -o -path ./var/lib/dpkg \) -prune -o -print | sort); }
 
 echo '== install'
 : >"$folder/apt.log"
 apt update
-apt install --no-install-recommends gcc libc6-dev cmake make pkg-config # what a user's own project needs
+apt install --no-install-recommends gcc libc6-dev cmake make pkg-config # for a user's own project
 files >"$folder/before.txt"
 mkdir -- "$root/packages"
 cp -- "${packages[@]}" "$root/packages"
@@ -73,7 +74,7 @@ as_user "zcat /usr/share/man/man1/hybrid.1.gz | grep -q 'SS hybrid run'; source 
 
 echo '== purge'
 apt purge hybrid 'libhybrid*' python3-hybrid
-# By default apt keeps what another package recommends or suggests.
+# By default apt keeps packages that another package recommends or suggests.
 apt autoremove --purge -o APT::AutoRemove::RecommendsImportant=false -o APT::AutoRemove::SuggestsImportant=false
 rm -rf -- "$root/tmp/user"
 files >"$folder/after.txt"

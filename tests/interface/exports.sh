@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# exports.sh LIBRARY LIST: the library exports the functions of the list, with their version, and nothing else.
+# exports.sh LIBRARY LIST: the library must export the functions of the list, with their version, and nothing else.
 set -euo pipefail
 found=$(nm --dynamic --defined-only --extern-only "$1" | awk '$2 != "A" { print $3 }' | sort)
 expected=$(sed 's/$/@@HYBRID_1/' "$2" | sort)

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# install.sh BUILD FOLDER [PYTHON]: installs the build below the folder, and builds and runs programs against the
-# installed files alone: through CMake, through pkg-config, and from Python if it is given. The tree is moved after its
-# installation, because nothing in it may name its first place.
+# install.sh BUILD FOLDER [PYTHON]: installs the build below the folder. Builds and runs programs against the
+# installed files alone: through CMake, through pkg-config, and from Python if PYTHON is given. The tree is moved after
+# its installation, because no file in it may name its first place.
 set -euo pipefail
 build=$1 folder=$2 python=${3-} here=$(cd -- "$(dirname -- "$0")" && pwd)
 rm -rf -- "$folder"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# program_pages.sh PROGRAM FOLDER: the manual page has every command and option of the help, and formats without a warning. The
-# completions of bash offer them, values and files.
+# program_pages.sh PROGRAM FOLDER: the manual page must have every command and option of the help, and format without a
+# warning. The completions of bash must offer commands, options, values and files.
 set -euo pipefail
 program=$1 folder=$2
 rm -rf -- "$folder"
@@ -33,8 +33,8 @@ if command -v groff >/dev/null; then
   [[ -z $warnings ]] || fail "the manual page: $warnings"
 fi
 
-# offered WORDS…: completions of the last word.
-# shellcheck disable=SC1091 # was written above
+# offered WORDS…: prints the completions of the last word.
+# shellcheck disable=SC1091 # the program has just written it
 source ./hybrid.bash
 offered() {
   COMP_WORDS=("$@")
@@ -42,7 +42,7 @@ offered() {
   _hybrid
   printf '%s\n' "${COMPREPLY[@]-}" | sort | tr '\n' ' '
 }
-# offers EXPECTED WORDS…
+# offers EXPECTED WORDS…: the completions of the last word must be EXPECTED.
 offers() {
   local expected=$1 found
   shift

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# readme.sh README FOLDER INCLUDE LIBRARY [PYTHON]: the README's scene, its C program and its Python program do what the
-# README says.
+# readme.sh README FOLDER INCLUDE LIBRARY [PYTHON]: the README's scene, C program and Python program must do what
+# the README says.
 set -euo pipefail
 readme=$1 folder=$2 include=$3 library=$4 python=${5-}
 mkdir -p -- "$folder"
-# The first block of a language that has the word.
+# block LANGUAGE WORD: prints the first block of the language that contains the word.
 block() {
   awk -v fence="\`\`\`$1" -v word="$2" '
     $0 == fence { inside = 1; text = ""; next }

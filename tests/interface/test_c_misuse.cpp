@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every misuse of the C interface is a code and a text that says where it was and what to do; the session
-// goes on as if the call had not been made.
+// Every misuse of the C interface gives a code, and a text with the place and a remedy. The session goes on
+// as if the call had not been made.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ class CMisuse : public tests::SceneFile {
                                    tests::path);
   }
 
-  // The text names the function (or the scene's file), says more than that, and ends with what to do.
+  // Expects the code, and a text with the function (or the scene's file), the words and a remedy.
   static void expect_refusal(hybrid_code got, hybrid_code code, const std::string& where,
                              const std::string& words = "") {
     const std::string text = hybrid_error_text();
@@ -43,7 +43,7 @@ class CMisuse : public tests::SceneFile {
   static constexpr double kAt_m[3] = {0.0, 0.0, 0.02};
 };
 
-// Calls with a session, which all functions check alike.
+// A call with a session. All functions check the session in the same way.
 struct SessionCall {
   const char* name;
   std::function<hybrid_code(hybrid_session*)> call;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Through the C interface a scene feels as in the program, to the bit; surfaces, edits, recordings and errors
+// Through the C interface a scene feels as in the program, to the bit. Surfaces, edits, recordings and errors
 // are those of the session.
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ bool same_bits(const double (&a)[3], const glm::dvec3& b) {
   return true;
 }
 
-// A session as `hybrid run` has it, in fixed steps.
+// A session in fixed steps, as `hybrid run` plays it.
 struct Reference {
   explicit Reference(const std::filesystem::path& file, bool asynchronous = true, bool measure_error = false)
       : scene(hybrid::load_scene(file)), built(hybrid::build_scene(scene)) {
@@ -76,7 +76,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, CShippedScene, ::testing::Values("cube", "wall"
 
 class CSessionFile : public tests::SceneFile {
  protected:
-  // Tissue with a rigid ball beside it; the tool starts at (0, 0, 20) mm.
+  // Tissue with a rigid ball beside it. The tool starts at (0, 0, 20) mm.
   static std::string text() {
     return "format = 1\n" + tests::block +
            "[[rigid]]\nname = \"ball\"\nprimitive = \"ball\"\nradius = 4\nposition = [16, 0, 0]\n" +
@@ -104,7 +104,7 @@ TEST_F(CSessionFile, OneTickAtATimeIsThePlayedPath) {
   EXPECT_EQ(again.hash, felt.back().hash);
 }
 
-// A caller with a later header has larger results: each goes where the caller's next one begins.
+// A caller with a later header has larger result structs. Each result must go to the start of a struct.
 TEST_F(CSessionFile, ResultsOfALaterVersionKeepTheirPlaces) {
   struct Later {
     hybrid_felt felt;
@@ -138,7 +138,7 @@ TEST_F(CSessionFile, PartsOfObjectsAddUpToTheForce) {
   EXPECT_GT(glm::length(sum), 0.01);
 }
 
-// K · depth, for a tool held in a rigid wall, before and after an edit of K.
+// A tool held in a rigid wall must feel K · depth, before and after an edit of K.
 TEST_F(CSessionFile, AnEditOfTheStiffnessIsFelt) {
   const CSession session(
       write("box.toml",
@@ -259,7 +259,7 @@ TEST_F(CSessionFile, SurfacesAreThoseOfTheSessionAndSayWhichMoved) {
   EXPECT_FALSE(ball_changed);
   EXPECT_TRUE(block_changed);
 
-  // The same ticks on a world of our own.
+  // The same ticks, on a world that this test builds itself.
   const hybrid::Scene read = hybrid::load_scene(scene());
   const hybrid::BuiltScene built = hybrid::build_scene(read);
   hybrid::begin_session(read, *built.world, *built.state, {0.0, 0.0, 0.02});
@@ -311,7 +311,7 @@ TEST_F(CSessionFile, TrianglesNameVertices) {
   }
 }
 
-// One thread ticks and publishes, one draws, one edits; none is refused.
+// One thread ticks and publishes, one draws, and one edits. None of them is refused.
 TEST_F(CSessionFile, ThreeThreadsMeetInOneSession) {
   const CSession session(scene(), {.relaxation = HYBRID_RELAX_THREAD, .recorded_ticks = 900});
   session.begin({0.0, 0.0, 0.02});

@@ -25,7 +25,7 @@ class CTickPath : public tests::SceneFile {
   }
 };
 
-// Also on a thread that never called the library before.
+// The same holds on a thread that has never called the library.
 TEST_F(CTickPath, ATickAllocatesLocksAndThrowsNothing) {
   if (COUNTS_CALLS == 0) GTEST_SKIP() << "skipped: sanitizers replace the functions that are counted";
   for (const std::uint32_t relaxation : {HYBRID_RELAX_IN_CALL, HYBRID_RELAX_THREAD, HYBRID_RELAX_TICK}) {

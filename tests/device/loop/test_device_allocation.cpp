@@ -18,7 +18,7 @@ namespace {
 std::atomic<std::size_t> allocations{0};
 }  // namespace
 
-// The operators are not inlined: otherwise the compiler would warn that free() does not match new.
+// The operators are not inlined, because the compiler would warn that free() does not match new.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;

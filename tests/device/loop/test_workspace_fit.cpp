@@ -19,7 +19,7 @@ TEST(WorkspaceFit, TheFramesDifferByAQuarterTurn) {
   EXPECT_EQ(device::device_to_scene_axes({0, 0, 1}), glm::dvec3(0, -1, 0));
   const glm::dvec3 a(0.3, -1.2, 2.5), b(-0.7, 0.4, 1.1);
   EXPECT_EQ(device::scene_to_device_axes(device::device_to_scene_axes(a)), a);
-  // The map is a rotation: it keeps lengths, angles and handedness.
+  // The map is a rotation, so it keeps lengths, angles and handedness.
   EXPECT_DOUBLE_EQ(glm::dot(device::device_to_scene_axes(a), device::device_to_scene_axes(b)),
                    glm::dot(a, b));
   EXPECT_EQ(glm::cross(device::device_to_scene_axes({1, 0, 0}), device::device_to_scene_axes({0, 1, 0})),

@@ -75,7 +75,7 @@ TEST_F(PathFile, WithoutAUnitTheCallersHolds) {
               ElementsAre(testing::AllOf(HasSubstr("taken as seconds"), HasSubstr("10 s"))));
 }
 
-// As `rostopic echo -p` writes it: the heading begins like a comment, and a column holds text.
+// A file of `rostopic echo -p`: the heading begins like a comment, and a column holds text.
 TEST_F(PathFile, AHeadingThatBeginsLikeAComment) {
   const Trajectory ros = read_trajectory(
       csv("%time,field.header.seq,field.header.frame_id,field.pose.position.x,field.pose.position.y,"
@@ -83,10 +83,10 @@ TEST_F(PathFile, AHeadingThatBeginsLikeAComment) {
           "1617187200000000000,1,base,0.1,0.2,0.3,0,1\n1617187200500000000,2,base,0.4,0.5,0.6,0,1\n"));
   EXPECT_THAT(ros.t_s, ElementsAre(0.0, testing::DoubleNear(0.5, 1e-6)));
   EXPECT_THAT(ros.position_m, ElementsAre(glm::dvec3(0.1, 0.2, 0.3), glm::dvec3(0.4, 0.5, 0.6)));
-  // A comment that could be a heading, above the heading.
+  // The comment above the heading could be a heading itself.
   const Trajectory headed = read_trajectory(csv("# t_ms,x_mm,y_mm,z_mm\nt_s,x_m,y_m,z_m\n0,1,2,3\n"));
   EXPECT_THAT(headed.position_m, ElementsAre(glm::dvec3(1, 2, 3)));
-  // A comment with text where a number is needed is no heading of the row.
+  // A comment is no heading if the row below it has text in a column of coordinates.
   EXPECT_THAT(refusal(csv("%time,x_m,y_m,z_m,note\n0,1,two,3,hello\n")), HasSubstr("no columns x, y and z"));
 }
 

@@ -50,7 +50,7 @@ TEST(RowFields, NumbersAreReadWithEitherMarkAndGroupsOfThree) {
   const auto comma = [](std::string_view text) { return number_in<double>(text, DecimalMark::comma); };
   EXPECT_EQ(point("-1.5e3"), -1500.0);
   EXPECT_EQ(point("+.5"), 0.5);
-  const std::string minus = "\xE2\x88\x92";  // of Unicode
+  const std::string minus = "\xE2\x88\x92";  // the minus sign of Unicode
   EXPECT_EQ(point(minus + "1.5e" + minus + "3"), -1.5e-3);
   EXPECT_EQ(comma(minus + "1,5"), -1.5);
   EXPECT_FALSE(point("-" + minus + "2"));
@@ -149,7 +149,7 @@ TEST(RowFields, ThousandSeparatorsAndDecimalCommasAreToldApart) {
               AllOf(HasSubstr("a file.csv:2: '10,000'"), HasSubstr("thousands")));
   EXPECT_THAT(tests::path_refusal("t_s;x_mm;y_mm;z_mm\n0,5;10;20;30\n0.75;10;20;30\n"),
               HasSubstr("decimal comma"));
-  // A column of text does not decide on the decimal mark.
+  // A column of text does not affect the choice of the decimal mark.
   EXPECT_EQ(tests::path_of("note;t_s;x_mm;y_mm;z_mm\n0,5;0.5;1.5;2;3\n").position_m[0],
             1e-3 * glm::dvec3(1.5, 2, 3));
 }

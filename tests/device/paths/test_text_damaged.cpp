@@ -65,7 +65,7 @@ void expect_sound(const std::vector<double>& t_s, const std::vector<glm::dvec3>&
   }
 }
 
-// The C library decides (iconv).
+// Asks iconv() of the C library.
 bool is_utf8(std::string text) {
   const iconv_t converter = iconv_open("UTF-32LE", "UTF-8");
   std::string out(4 * text.size() + 8, '\0');

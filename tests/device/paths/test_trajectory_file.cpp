@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measured trajectories: how each layout is interpreted, and what is refused.
+// Measured trajectories: the interpretation of each layout, and the refusals.
 #include "device/paths/trajectory_file.h"
 
 #include <gmock/gmock.h>

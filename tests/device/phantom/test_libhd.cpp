@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For every way in which the driver's library can be missing, the error says what to do.
+// The driver's library may be missing or incomplete in several ways. Each error names a remedy.
 #include "device/phantom/libhd.h"
 
 #include <gmock/gmock.h>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Faults of a PHANToM, one by one. Each leads to zero force within one tick, and to a message that says what
-// to do.
+// Faults of a PHANToM, one by one. Each leads to zero force within one tick, and to a message with a remedy.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -91,7 +91,7 @@ TEST(PhantomSignals, ACrashBesideTheServoThreadEndsInZeroForce) {
   EXPECT_EQ(died_of, SIGABRT);
 }
 
-// The open frame ends with zero force. Whether a real driver still sends it cannot be influenced.
+// The open frame ends with zero force. A real driver might not send this frame any more.
 TEST(PhantomSignals, ACrashOfTheServoThreadEndsItsFrameWithZero) {
   int died_of = 0;
   EXPECT_EQ(last_force_of_crash([] { std::abort(); }, false, died_of), 0.0);

@@ -135,7 +135,8 @@ TEST(ToolMechanics, AlongALineTheSubstepHardlyMatters) {
 }
 
 TEST(ToolMechanics, ATargetThatMovesAwayTakesTheToolAlongWhenItPullsMoreThanFriction) {
-  // The target moves at 10 mm/s. After 35 ms, 5 N·s/m and 600 N/m pull with 0.26 N, the friction.
+  // The target moves at 10 mm/s. After 35 ms, the hand's 5 N·s/m and 600 N/m pull as strongly as the
+  // friction, with 0.26 N.
   ToolMechanics mechanics = kHeld;
   mechanics.coulomb_N = 0.26;
   const glm::dvec3 speed(0.006, 0.0, -0.008);
@@ -160,8 +161,8 @@ TEST(ToolMechanics, ATargetThatMovesAwayTakesTheToolAlongWhenItPullsMoreThanFric
 }
 
 TEST(ToolMechanics, CoulombFrictionStopsASlideWhereItsEnergyIsSpent) {
-  // Without a hand, the tool moves on a straight line until ½·m·v² = f·distance. Then it rests to the last
-  // bit.
+  // Without a hand, the tool moves on a straight line until ½·m·v² = f·distance. After that its position
+  // stays the same to the last bit.
   const ToolMechanics loose{.mass_kg = 0.075, .coulomb_N = 0.04};
   ToolMotion motion;
   motion.velocity_m_per_s = {0.06, -0.08, 0.0};

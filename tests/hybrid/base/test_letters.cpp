@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Characters of UTF-8: which bytes are one, and which may be printed.
+// Characters of UTF-8: the bytes of a character, and the characters that may be printed.
 #include "hybrid/base/letters.h"
 
 #include <gtest/gtest.h>

@@ -342,7 +342,7 @@ TEST(BenchRigid, AQuickRunSaysWhatItMustAndNothingPopsThrough) {
       EXPECT_EQ(row.truncated_ticks, 0U) << name;
       EXPECT_EQ(row.judged.lost_ticks, 0U) << name;
     }
-    // The whole tick takes the same way as the rigid part alone.
+    // In the whole tick the proxy is as accurate as in the rigid part alone.
     if (row.engine == Engine::whole_tick) {
       EXPECT_LE(*row.judged.error_mesh_max, 1e-6) << name;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which rows `hybrid bench rigid` has by default, and the table of ratios.
+// The default rows of `hybrid bench rigid`, and its table of ratios.
 #include <gtest/gtest.h>
 
 #include <set>

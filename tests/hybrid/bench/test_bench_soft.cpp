@@ -57,7 +57,7 @@ TEST(BenchSoft, WavesOfTheProductAreExactAndThoseOfAHomogeneousBlockAreOctahedra
       EXPECT_EQ(*row.violated, 0U);
       EXPECT_TRUE(*row.exact);
     }
-    // Rows with a note are excluded: their hundred pushes reach the side of the block.
+    // Rows with a note are excluded, because their hundred pushes reach the side of the block.
     if (row.material == "homogeneous" && row.note.empty()) {
       EXPECT_EQ(*row.moved, octahedron(*row.depth_spacings / *row.slack));
     }
@@ -91,8 +91,8 @@ TEST(BenchSoft, SessionsAndLoadsSayWhatTheyAre) {
   EXPECT_TRUE(rows[1].force_error_N && rows[1].force_error_jnd && rows[1].truncated_share);
 }
 
-// Thesis, Fig 22: if both links of a corner move it, the corner oscillates for ever. The project's own tissue
-// comes to rest at once.
+// Thesis, Fig 22. A corner that is moved by each of its two links oscillates for ever. The project's own
+// tissue comes to rest at once.
 TEST(BenchSoft, ClassicOscillatesForEverAndOursSettles) {
   const auto objects = hybrid::bench::measure_settling(60);
   ASSERT_EQ(objects.size(), 2U);

@@ -66,8 +66,9 @@ TEST_F(ModelChoice, WhoAsksForAModelGetsIt) {
   EXPECT_NE(refusal(text(6e3, "model = \"rigid\"\n")).find("auto"), std::string::npos);
 }
 
-// The device goes equally deep into voxels and proxy. The proxy then gives the force that the choice assumes,
-// 8.5 N. The proxy must be chosen if and only if the force of the voxels is less than a JND smaller.
+// The device goes to the same depth with voxels and with a proxy. The proxy then gives the force that the
+// choice assumes, 8.5 N. The proxy must be chosen if and only if the force of the voxels is less than a JND
+// smaller.
 TEST_F(ModelChoice, TheChoiceIsWhatAHandWouldTell) {
   for (const double young_Pa : {3e4, 3e5, 1e7}) {
     const bool proxy = load(text(young_Pa, "model = \"auto\"\n")).soft.empty();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The build's notes on a soft object: where the felt surface lies with thick slices and small tools, and
-// which keys have no effect. The notes' figures are compared with the place where a tool first meets the
-// object.
+// The build's notes on a soft object: the place of the felt surface with thick slices and small tools, and
+// keys without effect. The notes' figures are compared with the place where a tool first meets the object.
 #include "hybrid/build/soft_notes.h"
 
 #include <fmt/format.h>

@@ -64,7 +64,7 @@ TEST_F(VolumeSurface, OfARangeIsWithinATenthOfASpacing) {
   }
 }
 
-// Another threshold gives another surface: the intensity reaches 500 one millimeter further in.
+// Another threshold gives another surface. The intensity reaches 500 one millimeter further in.
 TEST_F(VolumeSurface, FollowsTheThreshold) {
   write_ball(14.8);
   EXPECT_LT(rms_off("range = [500, 3000]\n", 13.8), 0.1);

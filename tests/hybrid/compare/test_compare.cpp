@@ -64,7 +64,7 @@ TEST_F(Compare, TheCubeAsProxyVoxelsAndHertz) {
   EXPECT_EQ(c.models[c.reference].name, "voxels");  // not Hertz, which ignores the core
   EXPECT_GT(max_force(*named(c, "mesh and proxy")), max_force(*named(c, "voxels")));
   ASSERT_NE(named(c, "classic"),
-            nullptr);  // the thesis's model: it feels the block, but its error is larger than that of Hertz
+            nullptr);  // the thesis's model feels the block, but with a larger error than Hertz's law
   EXPECT_GT(max_force(*named(c, "classic")), 0.05);
   EXPECT_GT(named(c, "classic")->rms_N, named(c, "hertz")->rms_N);
 }

@@ -16,7 +16,7 @@
 
 namespace {
 
-constexpr double kStiffness_N_per_m = 500.0;  // 0.5 N/mm, as in the rendered trajectories of the evaluation
+constexpr double kStiffness_N_per_m = 500.0;  // 0.5 N/mm, as in Ruffaldi et al. 2006
 constexpr double kRadius_m = 0.02, kTool_m = 0.002;
 
 class CompareMeasured : public tests::SceneFile {
@@ -103,8 +103,8 @@ TEST_F(CompareMeasured, ForcesOnTheObjectAreNoticedAndTurned) {
   EXPECT_LT(turned.rms_N, 1e-6);
 }
 
-// The evaluation's pipeline: forces are measured on the surface. A separate file without forces, the
-// in-trajectory, drives the device below the surface by force / stiffness.
+// The evaluation of Ruffaldi et al. (2006) measures forces on the surface. A separate file without forces,
+// the in-trajectory, drives the device below the surface by force / stiffness.
 TEST_F(CompareMeasured, AnInTrajectoryDrivesTheDevice) {
   std::string raw = "t_s,x_mm,y_mm,z_mm,fx_N,fy_N,fz_N\n", in = "t_s,x_mm,y_mm,z_mm\n";
   for (int i = 0; i <= 1000; ++i) {
@@ -143,8 +143,8 @@ TEST_F(CompareMeasured, AnyRateAndGaps) {
   EXPECT_THAT(result.notes[0], testing::HasSubstr("1 gap"));
 }
 
-// A recorded handover of a hand-held object. In the scene no surface is touched, so the error is the measured
-// force.
+// A recorded handover of a hand-held object. The tool touches nothing in the scene, so the error is the
+// measured force.
 TEST_F(CompareMeasured, ARealWrenchIsRead) {
   const auto folder = tests::shared_data("data/trajectories");
   SKIP_WITHOUT(folder);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole scenes along the same motion: their differences against elasticity and geometry.
+// Whole scenes along the same motion. Their differences follow from elasticity and geometry.
 #include "hybrid/compare/compare_scenes.h"
 
 #include <gmock/gmock.h>

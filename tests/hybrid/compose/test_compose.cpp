@@ -119,7 +119,7 @@ TEST_F(Compose, BonesBecomeSurfacesAndTheRestTissueAndEachIsFelt) {
   EXPECT_EQ(row(composed, "spleen").young_Pa, 2900.0);
   EXPECT_NEAR(row(composed, "liver").size_m.x, 0.048, 1e-12);
   EXPECT_EQ(row(composed, "rib_left_1").voxels, 6U * 4U * 16U);
-  // The surface lies where the labels are, with 12 x 8 x 32 mm, within the smoothing of one voxel.
+  // The surface is 12 x 8 x 32 mm large and lies at its labels, within the smoothing of one voxel.
   const auto rib = polygon::load_mesh(composed.scene.parent_path() / "rib_left_1.ply").mesh;
   glm::dvec3 low(1e300), high(-1e300);
   for (const glm::dvec3& v : rib.vertices) {

@@ -75,7 +75,7 @@ TEST_F(ComposedTissue, ThickSlicesAreReadAtTheSameSpacingAlongAllAxes) {
     EXPECT_EQ(notes_of(composed).find("along all axes") != std::string::npos, uneven) << notes_of(composed);
     EXPECT_THAT(build_notes(built), Not(HasSubstr("slices of")));
     if (uneven) {
-      // The number of voxels stays about the same: the spacing is the cube root of 2 x 2 x slice, rounded up
+      // The number of voxels stays about the same. The spacing is the cube root of 2 x 2 x slice, rounded up
       // to two digits.
       const double wanted_mm = std::ceil(10.0 * std::cbrt(4.0 * slice_mm) - 1e-9) / 10.0;
       EXPECT_NEAR(h.x, wanted_mm * 1e-3, 1e-9);

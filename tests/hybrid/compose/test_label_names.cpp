@@ -238,7 +238,7 @@ TEST(Tissues, AreKnownByTheirNames) {
                                                     {"trachea", "airway"},
                                                     {"thyroid_gland", "thyroid"},
                                                     {"adrenal_gland_left", "gland"},
-                                                    // However the words are joined.
+                                                    // Any way to join words.
                                                     {"Left-Femur", "femur"},
                                                     {"Right.Hip", "hip"},
                                                     {"LeftHumerus", "humerus"},

@@ -53,7 +53,7 @@ void expect_manifold(const TriangleMesh& mesh) {
     seen[edge.first] = true;
     std::size_t steps = 0;
     std::uint32_t rim = edge.second;
-    do {  // triangle (v, rim, third): the next one of the fan starts at v → third
+    do {  // triangle (v, rim, third); the fan's next triangle starts at v → third
       rim = next.at({edge.first, rim});
       ++steps;
     } while (rim != edge.second && steps <= triangles_at[edge.first]);
@@ -149,7 +149,7 @@ double rms_off_ball(const TriangleMesh& mesh, const ScannedBall& scan, double ra
   return std::sqrt(sum / static_cast<double>(mesh.vertices.size()));
 }
 
-// Smoothed labels are off by more than this bound.
+// Surfaces of smoothed labels exceed this bound.
 TEST(IntensitySurface, IsWithinATenthOfASpacingOfTheBall) {
   constexpr double kAllowed = 0.1;
   const auto infinite = std::numeric_limits<double>::infinity();
@@ -444,7 +444,7 @@ TEST(LabelSurface, SevenMillionVoxelsTakeAboutASecond) {
   total += timed("grow", [&] { hybrid::grow_labels(volume, 5.0); });
   total += timed("voxelise", [&] { hybrid::voxelise_mesh(mesh, glm::dvec3(1.0), 1, 10'000'000); });
   EXPECT_LT(total,
-            60.0);  // seconds; a wide bound for sanitizers and shared machines, as the times are printed
+            60.0);  // seconds; wide enough for sanitizers and shared machines
 }
 
 }  // namespace

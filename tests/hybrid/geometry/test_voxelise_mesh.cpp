@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Voxelised meshes against exact volumes and against the labels from which a surface was made. Also damaged
-// meshes.
+// Voxelised meshes against exact volumes and against the labels from which a surface was made. Damaged meshes
+// are tested too.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -34,7 +34,8 @@ dvec3 random_vector(std::mt19937_64& random, double half) {
   return {x, y, z};
 }
 
-// Dense random points of the surface, `a_triangle` per triangle. The map must report a box that contains one.
+// Dense random points of the surface, `a_triangle` per triangle. The map must report a box that contains such
+// a point.
 std::vector<dvec3> points_on(const polygon::TriangleMesh& mesh, std::mt19937_64& random, int a_triangle) {
   std::uniform_real_distribution<double> u(0.0, 1.0);
   std::vector<dvec3> points;
@@ -157,8 +158,8 @@ TEST_P(MovingBodies, AreNeverMissedAndFoundOnlyWhereTheyAre) {
         ASSERT_TRUE(said) << "body " << b << " was missed in round " << round;
         ++hits;
       }
-      // A reported body is near. In the body's frame the box is replaced by its bounds, which reach further
-      // by at most (√3 − 1) of its half diagonal. Cells add to this.
+      // A reported body must be near the box. The query uses the box's bounds in the body's frame. They
+      // exceed the box by at most (√3 − 1) of its half diagonal, and cells add to this.
       if (said) {
         ASSERT_LE(distance, 0.74 * glm::length(half) + 2.0 * kCell + 2e-3) << "body " << b << " is elsewhere";
       } else {

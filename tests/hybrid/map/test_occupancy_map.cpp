@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The occupancy map against brute force over its content. Its resolution is a cell: a query must report
+// The occupancy map against brute force over its content. Its resolution is a cell. So a query must report
 // everything inside a box, and may also report things within one cell of the box.
 #include "hybrid/map/occupancy_map.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The map of the felt difference of two models. The block has two halves; the models differ on one of them.
+// The map of the felt difference of two models. The block has two halves, and the models differ on one half.
 #include "hybrid/models/difference_map.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ const std::atomic<bool> kGoOn{false};
 
 class HalfChanged : public tests::SceneFile {
  protected:
-  // A block of 64 x 24 x 10 mm. Where x > 0 it has a modulus of its own.
+  // A block of 64 x 24 x 10 mm. Its half at x > 0 has a modulus of its own.
   hybrid::Scene scene(double young_right, const std::string& keys = {}, const std::string& more = {}) const {
     return load(
         "format = 1\n[tool]\nradius = 4\nstiffness = 1000\n[material.left]\nyoung = 8000\n"
@@ -36,7 +36,7 @@ class HalfChanged : public tests::SceneFile {
   static polygon::TriangleMesh surface_of(const hybrid::Scene& scene, const hybrid::BuiltScene& built) {
     return hybrid::drawn_scene(scene, built, "block").objects[0].surface;
   }
-  // The force at rest of a session that presses there.
+  // The force at rest of a session that presses at `at_m`.
   static glm::dvec3 pressed(const hybrid::Scene& scene, const glm::dvec3& at_m, const glm::dvec3& outward) {
     tests::Touch touch(scene, at_m + 2.0 * kRadius_m * outward);
     touch.go(at_m + (kRadius_m - kDepth_m) * outward, 1e-4, 50);
@@ -72,7 +72,7 @@ TEST_F(HalfChanged, IsFeltOnThatHalfAlone) {
   EXPECT_GT(found.share_felt, 0.15);
   EXPECT_LT(found.share_felt, 0.5) << "on the half that differs, and not at its bottom";
 
-  // The largest difference, from two sessions that press there.
+  // The largest difference must equal that of two sessions that press at its place.
   std::size_t most = 0;
   for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
     if (surface.vertices[v] == found.most.at_m) most = v;

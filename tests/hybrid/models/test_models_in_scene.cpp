@@ -55,7 +55,7 @@ TEST_F(Models, OfASoftBlock) {
                                  "proxy, matched"));
   EXPECT_THAT(row(block, "six-link").left_out, HasSubstr("has this model already"));
 
-  // The errors of a row are those of its own course against the reference, in each tick with this at rest.
+  // A row's error is that of its own course, over the ticks in which the reference is at rest.
   const ModelRow& given = row(block, "as given");
   double most = 0.0;
   for (std::size_t t = 0; t < given.course.size(); ++t) {
@@ -75,7 +75,7 @@ TEST_F(Models, OfASoftBlock) {
   EXPECT_LT(matched.felt.error.worst_jnd(), 0.1 * row(block, "proxy").felt.error.worst_jnd());
   EXPECT_THAT(hybrid::told_apart_by(row(block, "proxy"), block), testing::Contains("stiffness"));
 
-  // Coarser voxels are fewer, and the reference feels the block first.
+  // Coarser voxels are fewer. At most a bare finger tells the chosen row from the reference.
   EXPECT_LT(row(block, "spacing x 2").soft_voxels, given.soft_voxels);
   const auto best = hybrid::cheapest_untold(block);
   if (best) {
@@ -86,7 +86,7 @@ TEST_F(Models, OfASoftBlock) {
   EXPECT_EQ(json.at("objects").at(0).at("models").size(), block.rows.size());
   EXPECT_FALSE(hybrid::to_svg(hybrid::models_figure(models, "gel")).empty());
 
-  // The tables fit into 100 columns, and have each figure of the row.
+  // The tables fit into 100 columns, and each of the two has the given row.
   std::istringstream lines(hybrid::models_words(models));
   std::size_t of_given = 0;
   for (std::string line; std::getline(lines, line);) {
@@ -100,7 +100,7 @@ TEST_F(Models, OfASoftBlock) {
   }
   EXPECT_EQ(of_given, 2U);
 
-  // Each variant that is written reads as the scene that was played, and keeps the comments.
+  // A written variant keeps the file's comments, and gives the forces of its row.
   std::ifstream in(scene.file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   for (const ModelRow& r : block.rows) {
@@ -129,7 +129,7 @@ TEST_F(Models, APunchHasNoProxyAndSaysSo) {
   EXPECT_TRUE(row(block, "as given").felt.stiffness_N_per_m);
 }
 
-// Nothing soft is touched: the scene as given is exact. A rigid object also gets voxels, or a reason.
+// Nothing soft is touched, so the scene as given is exact. The rigid object also gets a row with voxels.
 TEST_F(Models, OfARigidBox) {
   const auto file =
       write("box.toml",

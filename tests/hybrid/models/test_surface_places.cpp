@@ -13,8 +13,8 @@ namespace {
 
 using hybrid::SurfacePlaces;
 
-// A square sheet of 20 x 20 mm in the plane z = 0 that faces upwards, and below it, a distance away, another
-// one that faces downwards.
+// Two square sheets of 20 x 20 mm. The upper one lies in the plane z = 0 and faces upwards. The lower one
+// lies `apart_m` below the plane and faces downwards.
 polygon::TriangleMesh two_sheets(double apart_m) {
   constexpr int cells = 20;
   constexpr double cell_m = 1e-3;
@@ -53,8 +53,8 @@ TEST(SurfacePlaces, CoverASurfaceEvenlyHoweverManyThereAre) {
     before_m = places.gap_m();
   }
   EXPECT_LE(places.gap_m(), 2e-3);
-  // A covering by discs of 2 mm has at least the area over that of a disc; one of the most distant places has
-  // at most the area over a disc of half the radius, and a rim.
+  // Discs of 2 mm radius around the places cover the sheets, which bounds their number from below. Discs of
+  // half this radius do not overlap and stay within a rim of 1 mm, which bounds the number from above.
   EXPECT_GT(given.size(), 2U * 400U / 13U);
   EXPECT_LT(given.size(), 2U * 484U / 3U);
   double area_m2 = 0.0;
@@ -81,7 +81,7 @@ TEST(SurfacePlaces, SpreadValuesWithoutTakingThemThroughAThinObject) {
 
 TEST(SurfacePlaces, KeepWhatIsNotKnown) {
   polygon::TriangleMesh mesh = two_sheets(0.5e-3);
-  mesh.vertices.emplace_back(1.0, 1.0, 1.0);  // of no triangle
+  mesh.vertices.emplace_back(1.0, 1.0, 1.0);  // belongs to no triangle
   SurfacePlaces places(mesh, 4e-3);
   EXPECT_TRUE(std::isnan(places.spread({})[0]));
   std::vector<float> values;
@@ -97,7 +97,7 @@ TEST(SurfacePlaces, KeepWhatIsNotKnown) {
     }
   }
   EXPECT_TRUE(std::isnan(spread.back()));
-  // Few places suffice, and a single one.
+  // Values of a single place can be spread too.
   SurfacePlaces few(mesh, 4e-3);
   (void)few.next(0.0);
   const std::vector<float> one{3.0F};

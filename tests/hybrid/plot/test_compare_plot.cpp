@@ -19,7 +19,7 @@ using tests::Folder;
 using tests::row;
 
 // Rows of 5 s with a press from 1 to 2 s. The reference feels 2 N, and each other model the given multiple of
-// it.
+// 2 N.
 std::vector<hybrid::ComparedModel> pressed(const std::vector<std::pair<std::string, double>>& others) {
   std::vector<hybrid::ComparedModel> models(1);
   models[0].name = "voxels";
@@ -49,7 +49,7 @@ TEST(ComparePlot, NamesEveryModelAndStaysSmall) {
   for (std::size_t m = 0; m < models.size(); ++m) {
     models[m].name = "model " + std::to_string(m);
     for (int i = 0; i < 50'000; ++i) {
-      // Each model has another rate.
+      // Each model has its own rate.
       hybrid::TraceRow r = row(i * 1e-3 * (1.0 + 0.1 * static_cast<double>(m)),
                                1.0 + std::sin(i * 0.7 + static_cast<double>(m)), 1);
       r.device_m.z = -5e-3 * std::sin(i * 1e-2);

@@ -292,7 +292,8 @@ std::vector<hybrid::TraceRow> press_and_stroke(double far_m) {
 }
 
 TEST(Contacts, AStrokeGoesFartherAcrossItsForceThanAlongIt) {
-  // The force leans by atan(0.5). Far strokes go by 0.45 of their length along it, and by 0.89 across.
+  // Friction tilts the force by atan(0.5). So a far stroke goes 0.45 of its length along the force, and 0.89
+  // across it.
   for (const auto& [far_m, stroke] : {std::pair(0.0, false), {1e-3, false}, {0.01, true}, {0.05, true}}) {
     const auto rows = press_and_stroke(far_m);
     const auto contacts = hybrid::contacts_of(rows, hybrid::contact_intervals(rows, ~0U));
@@ -327,7 +328,7 @@ TEST(Contacts, ThePathLengthIsThatOfTheWayAndNotOfTheEncodersSteps) {
   EXPECT_NEAR(hybrid::path_length_m(exact).back(), whole_m, 1e-4 * whole_m);
   EXPECT_NEAR(hybrid::path_length_m(exact)[1000], 0.5 * whole_m, 1e-4 * whole_m);
   EXPECT_NEAR(hybrid::path_length_m(reported).back(), whole_m, 0.05 * whole_m);
-  // The device is still; the last bit of its encoder alternates.
+  // The device is still, and the last bit of its encoder alternates.
   for (std::size_t i = 0; i < reported.size(); ++i)
     reported[i].device_m = {i % 2 == 0 ? 0.0 : step_m, 0.0, i % 3 == 0 ? 0.0 : step_m};
   EXPECT_LE(hybrid::path_length_m(reported).back(), 2.0 * step_m);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # cases.sh PROGRAM CASES FOLDER: small files that are easily read wrong, each with its right value. CASES is the folder
-# `cases` of the shared data; without it the test is skipped, or fails where HYBRID_EXPECT_DATA is set.
+# `cases` of the shared data. Without the folder the test is skipped, or fails if HYBRID_EXPECT_DATA is set.
 set -u
 program=$1 cases=$2 folder=$3
 failures=0
@@ -14,7 +14,7 @@ rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder" || exit 1
 
-# says NAME WORDS COMMAND...: the program says the words (an extended regular expression).
+# says NAME WORDS COMMAND...: the program must print the words (an extended regular expression).
 says() {
   local name=$1 words=$2
   shift 2
@@ -24,20 +24,21 @@ says() {
   cat log
   failures=$((failures + 1))
 }
-# is_not NAME WORDS: the last command did not say them.
+# is_not NAME WORDS: the last command must not have printed the words.
 is_not() {
   tr '\n' ' ' < log | grep -qE "$2" || return
   echo "FAILED: $1: '$2' is in:"
   cat log
   failures=$((failures + 1))
 }
-# path_of FILE NAME [SED]: a scene with a table whose top is at z = 0, along the rows of FILE, changed by SED.
+# path_of FILE NAME [SED]: writes a scene of a table whose top is at z = 0. The path has the rows of FILE after SED.
 path_of() {
   sed -e "${3:-}" "$1" > "$2.csv"
   printf 'format = 1\nunits = "mm"\n[device]\nmodel = "ideal"\n[[rigid]]\nname = "table"\nprimitive = "box"
 size = [200, 200, 20]\nposition = [0, 0, -10]\n[path]\nkind = "csv"\nfile = "%s.csv"\n' "$2" > "$2.toml"
 }
-# The path goes down at x = 10, y = 20 mm, and presses with 7 N; it takes 2 s, and the session half a second more.
+# follows FILE NAME [SED]: expects a path of 2 s that goes down at x = 10, y = 20 mm and presses with 7 N. The session
+# takes half a second more.
 follows() {
   path_of "$@"
   says "path $2" '^2500 ticks of 1 ms \(2\.50 s\).* force at most 7\.000 N' run "$2.toml" --samples 0 --trace "$2-t.csv"
@@ -86,7 +87,7 @@ label_2() {
 }
 two_mm=' 12 x 10 x 8 [a-z0-9]+, 2 x 2 x 2 mm'
 volumes=$cases/volumes
-export LC_ALL=C # headers are changed beside bytes that are no text
+export LC_ALL=C # because sed changes headers in files with binary data
 label_2 "$volumes/base.nii.gz"
 label_2 "$volumes/n_LAS.nrrd"
 sed 's/^space: .*/space: LAS/' "$volumes/n_LAS.nrrd" > short.nrrd
@@ -115,7 +116,7 @@ byte microns.nii 123 03 # xyzt_units
 says "NIfTI in microns" "2e-06 x 2e-06 x 2e-06 mm" check microns.nii
 says "a slope of 0" "$two_mm, 0 to 3, 4 labels" check "$volumes/slope0_inter5.nii"
 cp "$volumes/slope0_inter5.nii" slope1.nii
-byte slope1.nii 114 80 # scl_slope = 1: the intercept counts
+byte slope1.nii 114 80 # sets scl_slope to 1, so that the intercept counts
 byte slope1.nii 115 3f
 says "a slope of 1" "$two_mm, 5 to 8" check slope1.nii
 says "neither qform nor sform" "anatomical directions are unknown" check "$volumes/both_codes0.nii"
@@ -165,7 +166,7 @@ for file in lfs.stl pointer.obj pointer.ply; do
   says "$file" "Git LFS pointer" check "$file"
 done
 
-# names FILE WORDS: composing with these names says the words.
+# names FILE WORDS: `compose` with this file of names must print the words.
 names() {
   rm -rf composed
   says "names $1" "$2" compose --labels "$volumes/base.nii.gz" --names "$1" --out composed
@@ -187,7 +188,7 @@ names utf8.csv "Leber"
 iconv -f WINDOWS-1252 -t UTF-16 "$tables/latin1.csv" > utf16.csv
 names utf16.csv "utf16\.csv: is UTF-16 text; save it as UTF-8"
 
-# held TRACE FROM_S TO_S LEAST_N MOST_N NAME: the mean force is in the range, and in no tick below half of it.
+# held TRACE FROM_S TO_S LEAST_N MOST_N NAME: the mean force must be in the range, and no tick below half of the mean.
 held() {
   awk -F, -v a="$2" -v b="$3" -v least="$4" -v most="$5" '
     NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; next }
@@ -199,7 +200,8 @@ held() {
   failures=$((failures + 1))
 }
 tissue=$cases/tissue
-# gel10: the held force stays until the tool leaves, at any spacing and radius.
+# press NAME FROM_S TO_S LEAST_N MOST_N: plays NAME.toml and checks the held force. In gel10 this force must stay until
+# the tool leaves, at any spacing and radius.
 press() {
   says "$1" "ticks of 1 ms" run "$1.toml" --samples 0 --trace "$1.csv"
   held "$1.csv" "$2" "$3" "$4" "$5" "$1: the held force"
@@ -210,7 +212,7 @@ sed 's/^spacing = 2/spacing = 1/' "$tissue/gel10.toml" > fine.toml
 press fine 0.9 1.75 0.85 0.91
 { cat "$tissue/gel10.toml"; printf '[tool]\nradius = 3\n'; } > wide.toml
 press wide 0.9 1.75 1.3 1.45
-# st2: where the session begins, also inside the tissue, the held force is the same.
+# st2: the held force is the same wherever the session begins, also inside the tissue.
 for from in 6 9 14; do
   sed "s/^from=.*/from=[0,0,$from]/" "$tissue/st2.toml" > "from$from.toml"
   start=$(awk -v z="$from" 'BEGIN { print (z > 4 ? z - 4 : 4 - z) / 20 }') # speed 20 mm/s

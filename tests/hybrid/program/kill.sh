@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # kill.sh PROGRAM SCENES FOLDER KILLS [MODE…]: ends every command that writes files at KILLS random moments, in turns by
-# SIGKILL, SIGTERM and SIGINT. MODE: names from `modes` below; default: all. Every file must be whole or not be there,
-# those that were there before must be as they were or new, and recordings must replay. SIGTERM and SIGINT leave no
-# temporary file; SIGKILL may leave one whose name no user takes for the result: .hybrid-NUMBER.part, .compose-PROCESS,
+# SIGKILL, SIGTERM and SIGINT. MODE: names from `modes` below (default: all). Every file must be whole or absent. An older
+# file must be unchanged or replaced as a whole, and recordings must replay. SIGTERM and SIGINT leave no temporary file.
+# SIGKILL may leave one with a name that no user takes for the result: .hybrid-NUMBER.part, .compose-PROCESS,
 # FILE.partPROCESS. KILL_SEED sets the moments.
 set -u
 program=$1 scenes=$2 folder=$3 kills=$4
@@ -55,7 +55,7 @@ whole_json() {
     [ "$(tr -cd '{' < "$1" | wc -c)" = "$(tr -cd '}' < "$1" | wc -c)" ]
 }
 
-# Whether a file is whole, by its ending.
+# Whether a file is whole. Each kind of file has its own check.
 whole() {
   local file=$1
   case $file in
@@ -75,7 +75,7 @@ whole() {
   esac
 }
 
-# A file that is as it was when it was last found whole needs no second look.
+# Checks all files. A file that has not changed since it was found whole is not checked again.
 declare -A seen
 check_files() {
   local what=$1 signal=$2 file stamp
@@ -90,8 +90,8 @@ check_files() {
   done < <(find out -type f)
 }
 
-# killed NAME SIGNAL DELAY_S COMMAND…: SIGINT goes to the command and what it has started, as from a terminal. The shell
-# lets its background commands ignore SIGINT; env takes that back.
+# killed NAME SIGNAL DELAY_S COMMAND…: SIGINT goes to the command and its child processes, as from a terminal. The shell
+# makes background commands ignore SIGINT. `env` restores the default.
 killed() {
   local name=$1 signal=$2 delay_s=$3 process status
   shift 3
@@ -112,9 +112,9 @@ killed() {
 
 kinds=(KILL TERM INT)
 
-# short_mode COMMAND…: the first run is not killed, so that the others find its files. Every second moment is in the
-# last third of the time that a run takes, because most files are written there. That time follows the machine's load:
-# it shrinks after a signal that came too late, and grows after one that came in time.
+# short_mode COMMAND…: the first run is not killed, so that the others find its files. For every second round of signals,
+# the moments are in the last third of a run, because most files are written then. The assumed length of a run follows
+# the machine's load. It shrinks after a signal that came too late, and grows after one that came in time.
 short_mode() {
   local n start took_s delay_s in_time
   start=$EPOCHREALTIME
@@ -131,7 +131,7 @@ short_mode() {
   done
 }
 
-# long_mode LONGEST_S COMMAND…: of a command that takes long; no run is whole.
+# long_mode LONGEST_S COMMAND…: for a command that takes long. Every run is killed.
 long_mode() {
   local longest_s=$1 n
   shift
@@ -141,10 +141,10 @@ long_mode() {
   done
 }
 
-# with_scene COMMAND…: the command finds small.toml as out/scene.toml, as it is, whatever a run before has made of it.
+# with_scene COMMAND…: before each run, out/scene.toml becomes a fresh copy of small.toml.
 with_scene() { short_mode bash -c 'cp small.toml next.toml; mv next.toml out/scene.toml; exec "$@"' -- "$@"; }
 
-# kept_cache: what tune keeps, in a folder that no signal reaches.
+# kept_cache: makes a complete cache of `tune` in the folder kept. No signal is sent meanwhile.
 kept_cache() {
   [ -d kept ] && return
   cp small.toml kept.toml
@@ -159,7 +159,7 @@ in_mode() {
     realtime) short_mode "$program" run small.toml --realtime --samples 0 --trace out/t.csv --record out/r.rec \
       --json out/j.json --black-box out/b.csv ;;
     video)
-      # A stand-in for ffmpeg stores the frames as they come.
+      # A stand-in for ffmpeg stores the frames unchanged.
       mkdir bin
       printf '#!/bin/sh\nfor last; do :; done\ncat > "$last"\n' > bin/ffmpeg
       chmod +x bin/ffmpeg
@@ -184,7 +184,7 @@ in_mode() {
     tune)
       long_mode 5 "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json \
         --report out/page
-      # What was kept is kept: the same command comes to its end.
+      # The cache is still usable, so the same command must complete.
       "$program" tune small.toml --quick --cache out/cache --plot out/t.svg --json out/t.json > run.log 2>&1 ||
         fail "tune does not go on: $(tail -n 3 run.log)"
       check_files "tune, not killed" TERM

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# locale.sh PROGRAM SCENES FOLDER: the same bytes where a comma is the decimal point. The locale is made here; status 77
-# where it cannot be made.
+# locale.sh PROGRAM SCENES FOLDER: the program must write the same bytes where a comma is the decimal point. The script
+# makes the locale itself, and ends with status 77 if it cannot.
 set -u
 program=("$1") scenes=$2 folder=$3
 rm -rf "$folder"

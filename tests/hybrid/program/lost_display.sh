@@ -15,7 +15,7 @@ fail() {
   failures=$((failures + 1))
 }
 
-# begin_session: a server with a free number, a session on it, and a wait until its window has shown pictures.
+# begin_session: starts a server with a free number and a session on it. Waits until the session has shown pictures.
 begin_session() {
   rm -f r.rec seen.png view.log
   : > number # before the server opens it
@@ -32,7 +32,7 @@ begin_session() {
   [ -e seen.png ] || fail "no window: $(cat view.log)"
 }
 
-# check_end WORDS: the session has ended with these words, and its recording replays.
+# check_end WORDS: the session must end with these words, and its recording must replay.
 check_end() {
   local status
   wait "$session"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # pages.sh PROGRAM SCENES FOLDER [PAGE…]: opens report pages in Chromium, by default one of each command that writes
-# pages. A page must load nothing from elsewhere, must cause no error, and must fit into 400 and 1600 pixels; light,
-# dark and printed. Pictures of all forms are left in FOLDER. Without Chromium the test is skipped.
+# pages. A page must load nothing from elsewhere, cause no error, and fit into widths of 400 and 1600 pixels. It is
+# shown light, dark and printed, and pictures of these forms stay in FOLDER. Without Chromium the test is skipped.
 set -u
 program=$1 scenes=$2 folder=$3
 shift 3
@@ -17,14 +17,14 @@ fail() {
   failures=$((failures + 1))
 }
 
-# browse OPTIONS… PAGE
+# browse OPTIONS… PAGE: opens the page in Chromium.
 browse() {
   HOME=$folder/user timeout 120 "$chromium" --headless --no-sandbox --disable-gpu --disable-background-networking \
     --disable-component-update --disable-sync --no-first-run --hide-scrollbars \
     --user-data-dir="$folder/user/profile" "$@" 2> browser.log
 }
 
-# make NAME COMMAND…: the page of a command, NAME/report.html
+# make NAME COMMAND…: makes the page NAME/report.html of a command.
 pages=()
 make() {
   local name=$1
@@ -67,9 +67,9 @@ TOML
   make thesis bench thesis --quick
 fi
 
-# probe PAGE WIDTH: a page that shows another one in a frame of this width, as the browser's own window is 500 pixels
-# wide at least. The framed copy may load nothing, by a security policy. A script in it counts errors and refused
-# requests and measures its width; the title tells them.
+# probe PAGE WIDTH: writes probe.html, which shows the page in a frame of this width. The browser's own window cannot be
+# narrower than 500 pixels. A security policy forbids the framed copy to load anything. A script in the copy counts
+# errors and refused requests and measures the width. The title of probe.html reports them.
 probe() {
   {
     printf '<meta http-equiv="Content-Security-Policy" content="default-src %s; img-src data:; ' "'none'"

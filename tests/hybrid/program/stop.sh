@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# stop.sh PROGRAM SCENES FOLDER: signals end a session in order. What was asked for is written for what was played.
+# stop.sh PROGRAM SCENES FOLDER: signals end a session properly. All requested files are written, and cover the
+# ticks that were played.
 set -u
 program=$1 scenes=$2 folder=$3
 failures=0
@@ -13,10 +14,10 @@ fail() {
   failures=$((failures + 1))
 }
 
-# Far longer than it takes until the signal comes.
+# The session would last far longer than the time until the signal.
 session=("$program" run "$scenes/cube.toml" --seconds 2000 --samples 0 --trace t.csv --record r.rec --json j.json)
 
-# stopped SIGNAL STATUS WORDS WHEN COMMAND…: the signal comes settle_s after WHEN was said.
+# stopped SIGNAL STATUS WORDS WHEN COMMAND…: sends the signal settle_s seconds after the command has printed WHEN.
 settle_s=0
 stopped() {
   local signal=$1 wanted=$2 words=$3 when=$4 process status n
@@ -38,7 +39,7 @@ stopped() {
 
 for mode in "" --realtime; do
   when="tick [0-9]" settle_s=0
-  # In real time it says nothing while it runs; notes come while the scene is built, soon before the first tick.
+  # In real time a running session prints nothing. The build prints its notes soon before the first tick.
   [ -z "$mode" ] || when="note: block" settle_s=6
   for signal in INT TERM; do
     status=130 name=Ctrl-C
@@ -57,8 +58,8 @@ for mode in "" --realtime; do
   done
 done
 
-# From a terminal, Ctrl-C also reaches what the program has started. A stand-in for ffmpeg stores the frames as they
-# come, and ends at the signal, as any program does that does not care.
+# From a terminal, Ctrl-C also reaches the child processes of the program. A stand-in for ffmpeg stores the frames
+# unchanged. It does not handle the signal, so the signal ends it.
 mkdir bin
 printf '#!/bin/sh\nfor last; do :; done\ncat > "$last"\n' > bin/ffmpeg
 chmod +x bin/ffmpeg
@@ -76,7 +77,7 @@ status=$?
 [ -s v.mkv ] || fail "the video was lost: $(tail -n 3 run.log)"
 
 settle_s=0
-# A study keeps the rows that are done. It must take far longer than until its first words.
+# A study keeps its finished rows. Its first message must come long before its end.
 stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "^slide" \
   "$program" bench rigid --only slide --meshes ico2,ico3,ico5,ico6,ico7 --json j.json
 grep -q '"stopped": true' j.json || fail "the report of bench does not say that it was stopped"
@@ -84,7 +85,7 @@ stopped INT 130 "stopped by Ctrl-C after .* rows; report was written" "of [0-9]*
   "$program" stability "$scenes/wall.toml" --json j.json
 grep -q '"stopped": true' j.json || fail "the report of stability does not say that it was stopped"
 
-# Where there is nothing to keep, the end comes at once and leaves nothing.
+# If there is nothing to keep, the command ends at once and leaves no file.
 stopped INT 130 "by Ctrl-C" "left: the truth" "$program" compare "$scenes/head.toml" --models --json j.json
 [ ! -e j.json ] || fail "compare left a report"
 if ((failures > 0)); then exit 1; fi

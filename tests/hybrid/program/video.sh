@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # video.sh PROGRAM SCENES FOLDER: `view --video` and `run --video` hand every frame to ffmpeg, and write a video whole
-# or not at all. A stand-in for ffmpeg stores the frames as they come. Without a display, the test is skipped.
+# or not at all. A stand-in for ffmpeg stores the frames unchanged. Without a display, the test is skipped.
 set -u
 program=$1 scenes=$2 folder=$3
 failures=0
@@ -19,7 +19,8 @@ printf '#!/bin/sh\nfor last; do :; done\necho "$@" > words\ncat > "$last"\n' > g
 printf '#!/bin/sh\nfor last; do :; done\nhead -c 1000 > "$last"\nexit 1\n' > bad/ffmpeg
 chmod +x good/ffmpeg bad/ffmpeg
 
-# check FRAMES COMMAND...: the command writes v.mp4 with so many frames, or fails and leaves the old file.
+# check FRAMES COMMAND...: with a good ffmpeg, the command must write v.mp4 with this number of frames. With a bad one,
+# it must fail and leave the old file.
 check() {
   local frames=$1 size
   shift

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# window.sh PROGRAM FOLDER SCENE...: a user with mouse and keys in the window of each scene. The session ends well, the
-# driver reports no error, every picture is written, and the recording replays. $PAUSE_S: seconds between two
+# window.sh PROGRAM FOLDER SCENE...: simulates a user with mouse and keys in the window of each scene. The session must
+# end well, the driver report no error, every picture be written, and the recording replay. $PAUSE_S: seconds between two
 # actions (0.15). Without Xvfb and xdotool, the test is skipped.
 set -u
 program=$1 folder=$2
@@ -11,7 +11,7 @@ rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder" || exit 1
 command -v Xvfb xdotool > /dev/null || exit 77
-export MESA_DEBUG=1 # Mesa then writes every error of a call
+export MESA_DEBUG=1 # makes Mesa write every error of a call
 pause_s=${PAUSE_S:-0.15}
 
 fail() {
@@ -19,7 +19,7 @@ fail() {
   failures=$((failures + 1))
 }
 
-# keys NAME...: presses and releases each of them.
+# keys NAME...: presses and releases each key.
 keys() {
   local key
   for key in "$@"; do
@@ -28,7 +28,7 @@ keys() {
   done
 }
 
-# drag BUTTON X Y TO_X TO_Y, in pixels of the window.
+# drag BUTTON X Y TO_X TO_Y: drags without releasing the button. Places are in pixels of the window.
 drag() {
   xdotool mousemove "$2" "$3" mousedown "$1"
   for n in 1 2 3 4; do
@@ -37,7 +37,7 @@ drag() {
   done
 }
 
-# await FILE: waits until it is there. Fails if it does not come.
+# await FILE: waits until the file exists. Fails if it does not appear.
 await() {
   for ((n = 0; n < 1800; ++n)); do
     [ -e "$1" ] && return 0
@@ -48,8 +48,8 @@ await() {
   return 1
 }
 
-# visit SCENE: more than twenty things that a user does. Some of them come from a script, at a time of their own:
-# tissue is compared, gets another energy, place and model, and the tool another stiffness.
+# visit SCENE: does more than twenty actions of a user. A script does some of them at given times: it compares models of
+# the tissue, changes the tissue's energy, place and model, and changes the tool's stiffness.
 visit() {
   local name window tissue
   name=$(basename "$1" .toml)
@@ -58,7 +58,7 @@ visit() {
   cd "$name" || exit 1
   printf '0.2 picture begin.png\n0.3 stack on\n0.3 watch tick\n' > user.txt
   tissue=$(awk '/^\[/ {soft = /^\[\[soft\]\]/} soft && /^name/ {print; exit}' "$1" | cut -d'"' -f2)
-  if [ -n "$tissue" ]; then # what is not possible in a scene is refused there
+  if [ -n "$tissue" ]; then # actions that a scene does not allow are refused
     cat >> user.txt <<- END
 	1 select "$tissue"
 	1.5 difference "$tissue" as-is rigid 1 1000

@@ -56,8 +56,8 @@ double percentile_90(std::vector<double> values) {
   return values[values.size() * 9 / 10];
 }
 
-// The error that it finds is that of the same path ten times slower, within a factor of 2 (and 0.1 JND, which
-// no hand feels), whether it answers often or rarely.
+// The live reference finds the error against the same path played ten times slower, within a factor of 2 and
+// 0.1 JND, which no hand feels. This holds whether the reference answers often or rarely.
 TEST_F(LiveReferenceOf, TissueFindsTheErrorOfASlowRun) {
   const hybrid::Scene scene = load(kScene);
   const std::vector<glm::dvec3> at = path(0.4);
@@ -107,7 +107,7 @@ TEST_F(LiveReferenceOf, TissueTakesEdits) {
       .tick = 0, .object = 1, .quantity = hybrid::EditedQuantity::tissue_factor, .value = 2.0};
   ASSERT_TRUE(hybrid::apply_edit(touch.world(), touch.state(), twice));
   reference.edited(twice);
-  // The path up to the stop, and the stop until an answer of its last tick comes.
+  // Plays the path up to the stop. The tool then stays until an answer says that the force is that at rest.
   std::vector<hybrid::PassedTick> passed = play(touch, {at.begin(), at.end() - 30});
   for (const hybrid::PassedTick& tick : passed) reference.passed(tick);
   hybrid::PassedTick last = passed.back();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The editor of a scene's text: only the value changes, wherever the table stands.
+// The editor of a scene's text changes only the value, wherever the table stands.
 #include "hybrid/scene/edit_text.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Transforms that ITK itself writes place objects where ITK says. Files that cannot place one are refused.
+// Transforms that ITK itself writes place objects where ITK says. Files that cannot place an object are
+// refused.
 #include "hybrid/scene/itk_transform.h"
 
 #include <itkAffineTransform.h>
@@ -28,7 +29,7 @@ class ItkTransformFile : public tests::SceneFile {
     itk::TxtTransformIOFactory::RegisterOneFactory();
     itk::HDF5TransformIOFactory::RegisterOneFactory();
   }
-  // Written by ITK.
+  // Saves a transform by ITK's own writer.
   template <typename Number, typename Map>
   std::filesystem::path save(const std::string& name, const Map& map) const {
     const auto writer = itk::TransformFileWriterTemplate<Number>::New();
@@ -73,7 +74,8 @@ typename Map::Pointer random_rigid(Random& random) {
   return map;
 }
 
-// The pose takes each point of the object back to the point of the scene that ITK maps there.
+// ITK's map leads from the scene to the object, and the pose leads back. Returns the largest distance between
+// a point and its image under both (m).
 template <typename Map>
 double greatest_error_m(const Pose& pose, const Map& map, Random& random) {
   double most = 0.0;
@@ -110,8 +112,8 @@ TEST_F(ItkTransformFile, EveryRigidTransformOfItkIsReadBack) {
 }
 
 TEST_F(ItkTransformFile, ASceneTakesItInPlaceOfPositionAndRotation) {
-  // From the parent: a quarter turn about z, then 10 mm along x. So the object's x axis lies along the
-  // scene's -y.
+  // The map from the scene to the object is a quarter turn about z, then 10 mm along x. So the object's x
+  // axis lies along the scene's -y.
   write("t.tfm",
         "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\n"
         "Parameters: 0 -1 0 1 0 0 0 0 1 10 0 0\nFixedParameters: 0 0 0\n");

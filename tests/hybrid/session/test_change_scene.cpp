@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that goes on in a changed scene: it feels like a session that was in that scene from the
-// beginning, its clock and edits go on, and its recording replays to the same state.
+// A session that goes on in a changed scene feels like a session that was in that scene from the beginning.
+// Its clock and edits go on, and its recording replays to the same state.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -226,7 +226,7 @@ TEST_F(ChangedScene, ADamagedRecordingIsRefused) {
     (void)write("b.rec", bytes.substr(0, size));
     EXPECT_THROW((void)hybrid::load_recording(folder_ / "b.rec"), std::runtime_error) << size;
   }
-  // Count, tick, edits before, size of the text: each out of its range.
+  // Each field in turn is out of its range: the count, the tick, the earlier edits, the size of the text.
   for (std::size_t at = changes; at < changes + 32; at += 8) {
     std::string bad = bytes;
     bad[at + 7] = '\x40';

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files that a session writes for other programs are read back. Also the effect of thinning on a scene.
+// The files that a session writes for other programs are read back. The effect of thinning on a scene is
+// tested too.
 #include "hybrid/session/export_shapes.h"
 
 #include <array>

@@ -87,8 +87,8 @@ TEST_F(ForceErrorOfRun, AgreesWithASlowRun) {
   EXPECT_GT(full.error.all.max_jnd, worst / 1.2);
 }
 
-// The reference of shipped scenes that are kept voxel by voxel: the quick one finds the error of the full one
-// within a factor of 1.5, and plays at most three ticks for one of the session.
+// In shipped scenes that are solved voxel by voxel, the quick reference finds the error that the full one
+// finds, within a factor of 1.5.
 TEST(ForceErrorOfScenes, QuickAgreesWithFull) {
   for (const char* name : {"cleft", "tissue-on-bone", "edge-of-bone"}) {
     const hybrid::Scene scene =
@@ -106,8 +106,8 @@ TEST(ForceErrorOfScenes, QuickAgreesWithFull) {
   }
 }
 
-// On nested patches the full reference has patches twice as wide, the quick one has those of the session. So
-// the full one also finds the error of the patches, which is at most 5 % of the force here.
+// On nested patches, the full reference has patches twice as wide, and the quick one has those of the
+// session. So the full one also finds the error of the patches, which is at most 5 % of the force here.
 TEST(ForceErrorOfScenes, FullAlsoFindsTheErrorOfPatches) {
   const hybrid::Scene scene = hybrid::load_scene(tests::source_folder / "scenes/cube.toml");
   const auto play = [&](hybrid::Reference reference) {
@@ -121,8 +121,8 @@ TEST(ForceErrorOfScenes, FullAlsoFindsTheErrorOfPatches) {
 }
 
 // While the device is still, the quick reference may stop being slow, but not before the tissue is at rest.
-// The course here says that the hand feels the force of the equilibrium all through the hold. So the error
-// that is found is that of the reference.
+// Here the course has the force of the equilibrium during the whole hold. So any error found is that of the
+// reference itself.
 TEST_F(ForceErrorOfRun, DoesNotRestTooEarly) {
   const hybrid::Scene scene = load(beside_a_ball(100.0));
   // The device arrives after 0.1 s, and holds until 0.5 s.

@@ -215,8 +215,8 @@ TEST_F(PairsInATrace, ChangeNothingInTheSession) {
   EXPECT_TRUE(hybrid::pair_columns(*built.world, without.between).empty());
 }
 
-// A trace is also a path of the hand. The new columns must not be taken for a part of it, whatever the
-// objects' names.
+// A trace is also a path of the hand. The columns of forces must not be taken for a part of the path,
+// whatever the objects' names.
 TEST_F(PairsInATrace, AreNoPartOfThePathThatATraceIs) {
   hybrid::Scene scene = shipped("tissue-on-bone");
   scene.soft[0].name = "tool, position x";

@@ -43,8 +43,8 @@ unsigned part_of(void* address) {
   if (dladdr(address, &info) == 0) return 0;
   const std::string_view file = info.dli_fname != nullptr ? info.dli_fname : "";
   const std::string_view name = info.dli_sname != nullptr ? info.dli_sname : "";
-  // Mangled names contain _ZN5voxel… or _ZNK5voxel…. Templates of the standard library with such an argument
-  // count as well.
+  // Mangled names contain _ZN5voxel… or _ZNK5voxel…. Templates of the standard library with an argument of
+  // these namespaces count as well.
   if (name.find("5voxel") != std::string_view::npos) at->second |= part_voxel;
   if (name.find("7polygon") != std::string_view::npos) at->second |= part_polygon;
   if (file.find("embree") != std::string_view::npos) at->second |= part_embree;

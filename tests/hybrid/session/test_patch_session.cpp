@@ -93,7 +93,7 @@ TEST_F(GridSession, TheWindowShowsTheDent) {
   };
   const auto pressed = shown();
   hybrid::Snapshot right;
-  // Points that a view asks for, within the object, move as the object says.
+  // Points in the object that a view asks for must move as in a snapshot of the whole object.
   hybrid::AskedPoints asked{.number = 7, .at_rest_m = {{}}};
   for (const glm::dvec3& v : drawn.objects[0].surface.vertices)
     asked.at_rest_m[0].push_back(glm::mix(drawn.objects[0].inside.from_voxels({30.0, 30.0, 12.0}), v, 0.7));
@@ -418,8 +418,8 @@ TEST_F(GridSession, AClosedPathBesideABoneGivesTheHandNoEnergy) {
   }
 }
 
-// A copied state plays like its original, also where the patches come to tissue that they did not have when
-// the state was copied: here to stiff parts and to the far end of the block, whose nodes are partly outside.
+// A copied state plays like its original, also if the patches come to tissue that they did not have at the
+// copy. Here these are stiff parts, and the far end of the block, whose nodes are partly outside.
 TEST_F(GridSession, ACopyFeelsTheSame) {
   const hybrid::Scene scene = load(
       block("spacing = 1\ninclusions = [{ shape = \"ball\", centre = [14, 6, 24], size = 9, label = 2 }, "

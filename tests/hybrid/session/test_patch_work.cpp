@@ -17,8 +17,9 @@ std::string block_with(const std::string& more) {
 
 using PatchWork = tests::SceneFile;
 
-// A share of the work delays the force and does not change it: with the tool held still it is the same, on
-// nested patches (2 mm) and voxel by voxel (4 mm). A patch of another width is another approximation.
+// A share of the work delays the force, but does not change it. With the tool held still, the force becomes
+// the same on nested patches (2 mm) and voxel by voxel (4 mm). A patch of another width is another
+// approximation.
 TEST_F(PatchWork, LessWorkIsFeltLaterNotOtherwise) {
   const double top = 0.032 - 0.002 + 0.008;
   const auto held = [&](const std::string& more) {
@@ -32,7 +33,7 @@ TEST_F(PatchWork, LessWorkIsFeltLaterNotOtherwise) {
   for (const std::string spacing : {"spacing = 2\n", "spacing = 4\n"}) {
     const glm::dvec3 whole = held(spacing);
     EXPECT_GT(whole.z, 0.1);
-    // With a tenth of the work 0.4 s are not quite enough voxel by voxel.
+    // Voxel by voxel, 0.4 s with a tenth of the work are not quite enough, so the second bound is wider.
     EXPECT_LT(hybrid::jnd_of(held(spacing + "work = 0.5\n"), whole, hybrid::kJndFloor_N), 0.1) << spacing;
     EXPECT_LT(hybrid::jnd_of(held(spacing + "work = 0.1\n"), whole, hybrid::kJndFloor_N), 0.5) << spacing;
   }

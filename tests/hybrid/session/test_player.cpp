@@ -141,7 +141,7 @@ TEST_F(PlayerOf, PausesTicksOnceAndSlowsDown) {
   EXPECT_EQ(samples, player_->ticks()) << "one for each tick";
 }
 
-// From one kept state the session goes on in two ways; each is replayed to its own end.
+// From one kept state the session goes on in two ways. Each way replays to its own end.
 TEST_F(PlayerOf, GoesBackToAKeptStateAndOnAnotherWay) {
   for (const int relaxation : {0, 1, 2}) {
     built_ = hybrid::build_scene(scene_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recorded session replays bit for bit; a damaged file is refused or detected.
+// A recorded session replays bit for bit. A damaged file is refused or detected.
 #include "hybrid/session/recording.h"
 #include "hybrid/tick/tissue/async_relaxation.h"
 
@@ -123,7 +123,7 @@ TEST_F(RecordingFile, WithTheRelaxationThreadItIsTheSameToTheBit) {
   }
 }
 
-// `run --device`: the ideal device has neither passivity nor a limit of energy.
+// As with `run --device`. The ideal device has neither passivity control nor a limit on energy.
 TEST_F(RecordingFile, TheReplayHasTheDeviceThatWasUsedNotTheScenes) {
   using enum device::DeviceModel;
   struct Case {
@@ -437,7 +437,7 @@ TEST_F(RecordingFile, TruncatedAndGarbageFilesAreRefusedInWords) {
   std::string cut_name = bytes;
   cut_name[104] = '\0';
   EXPECT_NE(refusal_of(cut_name).find("damaged name of its scene"), std::string::npos);
-  // Values of a tick that no session writes: its fault and its share of work.
+  // A tick with values that no session writes, for its fault and for its share of work.
   const std::size_t last_tick = bytes.size() - 48;
   for (const std::size_t field : {std::size_t{32}, std::size_t{33}, std::size_t{36}, std::size_t{37}}) {
     std::string wrong = bytes;

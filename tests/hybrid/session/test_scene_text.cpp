@@ -94,7 +94,7 @@ TEST_F(SceneText, WhatHasNoPlaceIsLeft) {
   EXPECT_NE(edited.left[3].find("may share a material"), std::string::npos);
 }
 
-// A key that a table within a line lacks is added behind a value of the table.
+// If a table on one line lacks a key, the key is added behind one of its values.
 TEST_F(SceneText, AKeyIsAddedWithinALine) {
   const std::string text =
       "format = 1\ntool = { radius = 2 } # one\nrigid = [{ primitive = \"ball\", name = \"a\" }, # two\n]\n";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The measured boundaries of the haptic loop against theory, at a few settings. `hybrid stability` measures
-// all settings. Also the perception of vibrations.
+// all settings. The perception of vibrations is tested too.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which labels belong to which scan: the layouts in which data sets are published.
+// Labels are paired with their scans, in the layouts in which data sets are published.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ using ::testing::IsEmpty;
 
 class PairScans : public tests::SceneFile {
  protected:
-  // Makes empty files: only names count.
+  // Makes empty files, because only names count.
   void make(const std::vector<std::string>& names) const {
     for (const std::string& name : names) {
       fs::create_directories((folder_ / name).parent_path());
@@ -103,7 +103,7 @@ TEST_F(PairScans, SeveralLabelsForOneScanAreRefusedByName) {
   const auto found = pair_scans(in_folder({"a.nii.gz", "b.nii.gz"}),
                                 strings({"a_bones.nii.gz", "a_organs.nii.gz", "b_bones.nii.gz", "b.mha"}));
   EXPECT_THAT(found[0].unpaired, HasSubstr("2 label volumes belong to it by name, a_bones.nii.gz"));
-  EXPECT_EQ(found[1].labels.filename(), "b.mha");  // its very name
+  EXPECT_EQ(found[1].labels.filename(), "b.mha");  // has exactly the name of the scan
 }
 
 TEST_F(PairScans, LabelsByTheNameOfTheRow) {
@@ -113,7 +113,7 @@ TEST_F(PairScans, LabelsByTheNameOfTheRow) {
   ASSERT_EQ(found.size(), 2U);  // the labels are no scan
   EXPECT_EQ(found[0].labels, organs);
   EXPECT_EQ(found[1].labels.filename(), "b_labels.nii.gz");
-  // The name counts more than that of the file; a file may have '=' in its name.
+  // A stated name of a row counts more than the file's name. A file may have '=' in its name.
   EXPECT_EQ(
       pair_scans(in_folder({"in/b.nii.gz"}), {"b=" + organs, (folder_ / "b_2=x.nii.gz").string()})[0].labels,
       organs);

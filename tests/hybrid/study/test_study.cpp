@@ -106,7 +106,7 @@ TEST_F(StudyOfScans, WhatIsDoneStaysUntilItsFilesChange) {
   const JudgedScan first = hybrid::judge_scan(options.scans[0], options);
   ASSERT_EQ(first.failed, "");
   const auto written = fs::last_write_time(first.scene);
-  // Times of ticks differ from session to session; equal ones are from the same session.
+  // Times of ticks differ between sessions. Equal times show that no new session was played.
   const JudgedScan again = hybrid::judge_scan(options.scans[0], options);
   EXPECT_EQ(again.session.tick_us.max, first.session.tick_us.max);
   EXPECT_EQ(again.session.worst_near, first.session.worst_near);
@@ -192,7 +192,7 @@ TEST(StudyOutliers, OneOfManyIsFoundAndSpreadIsNot) {
   EXPECT_THAT(hybrid::outliers_among({1.0, 2.0, 4.0, 8.0, 16.0}), ElementsAre(0, 0, 0, 0, 0));
   EXPECT_THAT(hybrid::outliers_among({1.0, 1.0, 1.0, 1.0, 1.01}), ElementsAre(0, 0, 0, 0, 0));
   EXPECT_THAT(hybrid::outliers_among({1.0, 1.0, 100.0}), ElementsAre(0, 0, 0));  // too few to tell
-  // Low values are no outliers; scale does not count.
+  // Low values are no outliers, and the scale of the values does not matter.
   EXPECT_THAT(hybrid::outliers_among({1e9, 1e9, 1e9, 1e9, 1.0}), ElementsAre(0, 0, 0, 0, 0));
   const auto scaled = hybrid::outliers_among({1e-6, 1.1e-6, 0.9e-6, 1.05e-6, 4e-6, 1e-6});
   EXPECT_NEAR(scaled[4], 4.0 / 1.0, 0.3);

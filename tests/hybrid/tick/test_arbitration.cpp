@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Precedence of objects in contact: one scene for each rule, and four bounds for all scenes. (a) After every
-// tick, no voxel's ball is deeper than a twentieth of a spacing in a rigid object. (b) At rest, anchors and
-// rigid surfaces carry the force on the hand. (c) Nothing passes through anything at 1 m/s. (d) A closed path
-// gives the hand no energy.
+// Precedence of objects in contact. There is one scene for each rule, and four bounds for all scenes. (a)
+// After every tick, no voxel's ball is deeper than a twentieth of a spacing in a rigid object. (b) At rest,
+// anchors and rigid surfaces carry the force on the hand. (c) Nothing passes through anything at 1 m/s. (d) A
+// closed path gives the hand no energy.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ using tests::Touch;
 struct Stroke {
   std::vector<dvec3> points_mm;
   std::vector<Face> fronts{};  // faces in front of which the tool's centre must stay
-  // The common bounds. A case may state wider ones, with the reason beside it.
+  // The common bounds. A case may state wider bounds, with the reason beside them.
   double deepest = 0.05;   // spacings
   std::size_t passed = 0;  // number of voxels in a solid, summed over the ticks
 };
@@ -244,7 +244,7 @@ TEST_P(Arbitration, AClosedPathGivesTheHandNoEnergy) {
         }
         // Richardson extrapolation removes the error of the trapezoidal rule at the highest speed. Around an
         // edge of bone, the force turns between two ticks, and the error is proportional to the square of the
-        // step. Around the tissue's edge it is 2.49, 0.65 and 0.13 uJ at 0.25, 0.125 and 0.0625 m/s.
+        // step. Around the tissue's edge, the error is 2.49, 0.65 and 0.13 uJ at 0.25, 0.125 and 0.0625 m/s.
         // Simpson's rule is no better (2.87 uJ), because the force has kinks there. The work of tissue is not
         // corrected, because it depends on the speed.
         const double rigid_J = speed == 0.25 ? (4.0 * slower.rigid_J - work.rigid_J) / 3.0 : work.rigid_J;

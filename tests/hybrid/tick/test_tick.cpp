@@ -71,7 +71,7 @@ TEST_P(Energy, AClosedLoopOverTheBorderGivesTheHandNothing) {
                                      {-x, -2 * way, z},
                                      {-x, -2 * way, 15}}};
     touch.go(1e-3 * loop[0], 5e-6);
-    double work = 0.0, most = 0.0;  // J, gained by the hand; N
+    double work = 0.0, most = 0.0;  // energy gained by the hand (J); largest force (N)
     dvec3 before_m = touch.state().device_m, before_N(0.0);
     for (const dvec3& to : loop) {
       touch.go(1e-3 * to, 5e-6, 0, [&](const TickResult& felt) {  // 5 mm/s
@@ -264,12 +264,12 @@ TEST_F(Tick, APunchDrawnAgainstRowsThatStandOnAnchorsIsStoppedAndNotLifted) {
   }
 }
 
-// A tool of many spacings touches thousands of voxels. It must feel them or report the overload; a zero force
+// A tool of many spacings touches thousands of voxels. It must feel them or report the overload. A zero force
 // is wrong.
 TEST_F(Tick, AToolOfManySpacingsIsFelt) {
   Touch touch(load(deep_block(20, 0.75)), {0, 0, 0.03});
   const TickResult felt = touch.go({0, 0, 0.0185}, 5e-5, 500);
-  // Hertz contact in series with the coupling; the block is small for a half-space.
+  // Hertz contact in series with the coupling. The block is small for a half-space.
   const double at_rest = 20e-3 - felt.proxy_m.z;
   const double hertz = 4.0 / 3.0 * 5000.0 / 0.91 * std::sqrt(20e-3) * std::pow(at_rest, 1.5);
   std::printf("tool of 27 spacings: %.4f N, Hertz %.4f N; %zu voxels near\n", coupling(felt).z, hertz,

@@ -13,7 +13,7 @@ using hybrid::ForceCourse;
 
 constexpr double kDt_s = 1e-3, kCoupling = 800.0;
 
-// A press from z = 0 to `deepest_m` and back, in 200 ticks; `law`: force over depth.
+// A press from z = 0 to `deepest_m` and back, in 200 ticks. `law` gives the force at a depth.
 template <class Law>
 ForceCourse press(double deepest_m, const Law& law) {
   ForceCourse course;
@@ -37,8 +37,8 @@ TEST(FeltStiffness, OfASpringIsItsStiffness) {
   EXPECT_NEAR(*slope, 250.0, 1e-9);
 }
 
-// The least-squares slope of F = c d^1.5 over evenly spread depths up to D is 36/35 · c √D: the integral of
-// 12 (x − 1/2) x^1.5 over 0 to 1 is 12 (2/7 − 1/5).
+// The least-squares slope of F = c d^1.5 over evenly spread depths up to D is 36/35 · c √D. The
+// factor is the integral of 12 (x − 1/2) x^1.5 over 0 to 1, which is 12 (2/7 − 1/5).
 TEST(FeltStiffness, OfHertzIsTheSlopeOfItsRegression) {
   const double deepest_m = 4e-3, c = 30.0;
   const auto course = press(deepest_m, [c](double d) { return c * std::pow(d, 1.5); });
@@ -70,7 +70,7 @@ TEST(MatchStiffness, ASpringIsFoundExactly) {
   EXPECT_NEAR(match->force_N, 0.75, 1e-12);
 }
 
-// No other stiffness leaves less: tried by brute force around the fit.
+// Brute force around the fit finds no stiffness with a smaller residual.
 TEST(MatchStiffness, NoOtherStiffnessFitsHertzBetter) {
   const auto hertz = [](double d) { return 60.0 * std::pow(d, 1.5); };
   const auto tissue = press(3e-3, hertz);

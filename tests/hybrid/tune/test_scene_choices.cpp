@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Changes of a scene while it is felt: which ones an object allows, and the scene's text after them.
+// Changes of a scene during a session: the changes that an object allows, and the text after them.
 #include "hybrid/tune/scene_choices.h"
 
 #include <gmock/gmock.h>

@@ -62,7 +62,8 @@ TEST_F(Tune, AnErrorIsWhatCompareSaysOfTheTwoFiles) {
   EXPECT_GT(other.memory_bytes, 0U);
 }
 
-// In each pose a truth is at rest: relaxed for longer still, its force stays. It is the same every time.
+// In each pose a truth is at rest. Longer relaxation does not change its force. Each run gives the same
+// truth.
 TEST_F(Tune, ATruthIsAtRestInItsPoses) {
   const Scene scene = hybrid::on_ideal_device(hybrid::load_scene(gel("a.toml", "2")));
   const Motion motion = hybrid::scene_motion(scene);
@@ -90,7 +91,8 @@ TEST_F(Tune, ATruthIsAtRestInItsPoses) {
 }
 
 TEST_F(Tune, PosesLieInContactsAndWhereTheDeviceStops) {
-  // 0.5 mm a tick: free for 100 ticks, in contact for 100, still for 50 more of contact, then away.
+  // At 0.5 mm per tick, the device is free for 100 ticks and in contact for 100. It then stays in contact for
+  // 50 ticks without motion, and moves away.
   hybrid::ForceCourse course;
   for (int t = 0; t < 400; ++t) {
     const double moved = t < 200 ? t : t < 250 ? 200 : t - 50;
@@ -108,13 +110,13 @@ TEST_F(Tune, PosesLieInContactsAndWhereTheDeviceStops) {
   EXPECT_GE(moving, 7);
   EXPECT_EQ(stops, 1);
   EXPECT_EQ(std::ranges::count(hybrid::every_nth(poses, 100).held, true), 2);
-  // Bodies that move may move the tissue at any time.
+  // Bodies that move may move the tissue at any time, so no pose is a stop.
   const hybrid::Poses moved = hybrid::poses_along(course, 1e-3, true, 10);
   EXPECT_EQ(std::ranges::count(moved.stops, true), 0);
   EXPECT_EQ(std::ranges::count(moved.held, true), 10);
 }
 
-// A divided voxel is the same body, so surfaces, materials and anchors stay in place.
+// Divided voxels fill the same body, so surfaces, materials and anchors stay in place.
 TEST_F(Tune, ATruthHasTheScenesOwnShape) {
   const Scene scene =
       hybrid::read_scene(write("ball.toml",
@@ -188,13 +190,13 @@ TEST_F(Tune, ASearchThatWasEndedGoesOnAndGivesTheSame) {
   const auto objects = hybrid::tunable_objects(scene);
   const Motion motion = hybrid::scene_motion(hybrid::with_setting(scene, hybrid::own_setting(objects)));
   const hybrid::Step step = [](const std::string&, double, const auto& work) { work({}); };
-  // A search with more poses takes no error of this one.
+  // A search with more poses has other keys, so it reuses no error of this search.
   EXPECT_NE(hybrid::measure_truth(plan_of(scene, objects, true), motion, {{}, scene}, step).key,
             hybrid::measure_truth(plan_of(scene, objects, false), motion, {{}, scene}, step).key);
   options.cache.clear();
   expect_equal(resumed, hybrid::tune(scene, options), false);
 
-  // This result also gives what a user sees: front, truth, confirmation, text, JSON and plot.
+  // The result has all parts that a user sees: front, truth, confirmation, text, JSON and plot.
   EXPECT_GE(resumed.front.size(), 3U);
   EXPECT_LT(resumed.truth.error_jnd(), 2.0);
   EXPECT_TRUE(resumed.confirmation.not_done.empty()) << resumed.confirmation.not_done;
@@ -259,7 +261,7 @@ TEST_F(Tune, AVerdictKeepsTheSceneApartFromItsSetting) {
   result.truth.spacing->still = {.ticks = 10, .p99_jnd = 2.3};
   EXPECT_THAT(hybrid::tune_verdict(result), testing::StartsWith("2 mm six-link"));
   EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("differ from ever finer ones by about 2.3 JND"));
-  // The most accurate setting in time is not called enough.
+  // The verdict does not call a setting enough that is only the most accurate within the time.
   result.settings[0].setting.objects = {{.object = "block", .proxy = true}};
   EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("A proxy is enough here"));
   result.choice.rule = hybrid::ChoiceRule::most_accurate_in_time;
@@ -290,7 +292,7 @@ TEST_F(Tune, AProxyWithAFittedCouplingIsChosenWhereItIsEnough) {
   EXPECT_THAT(hybrid::tune_verdict(result), HasSubstr("A proxy is enough here"));
   EXPECT_THAT(hybrid::tune_reason(result), HasSubstr("its coupling fits the truth's force up to"));
 
-  // The scene that is written is felt as the setting was.
+  // The written scene gives the same forces as the setting.
   std::ifstream in(file);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   const std::string edited = hybrid::edited_scene(text, file, result.objects, chosen.setting, "why");
@@ -306,7 +308,7 @@ TEST_F(Tune, AProxyWithAFittedCouplingIsChosenWhereItIsEnough) {
     return hybrid::felt_error(played, reference, result.floor_N, 1.0 / scene.rate_hz).worst_jnd();
   };
   EXPECT_EQ(error(along(hybrid::with_setting(scene, chosen.setting))), 0.0);
-  // A setting's error is that of the worse of two motions, of which the scene's path is one.
+  // A setting is played along the scene's path and a second motion. Its error is the larger of the two.
   EXPECT_FALSE(result.second_motion.empty());
   EXPECT_LE(error(result.truth.course), chosen.error.worst_jnd() + 1e-9);
   EXPECT_GT(error(result.truth.course), 0.0);
@@ -347,7 +349,7 @@ TEST_F(Tune, LessWorkIsTriedWhereItHasAnEffect) {
   EXPECT_EQ(hybrid::settings_with_less_work(own, true).size(), 3U);
   EXPECT_THAT(hybrid::in_words(voxels[0], 1e-3), HasSubstr("six-link, work 0.5"));
   EXPECT_THAT(hybrid::as_toml(voxels[0]), HasSubstr("work = 0.5\n"));
-  // The truth does all of the work.
+  // The truth does all of the work, although the scene has `work = 0.5`.
   EXPECT_EQ(hybrid::as_reference(hybrid::read_scene(write(
                                      "s.toml", "format = 1\n" + tests::block + "work = 0.5\n" + tests::path)),
                                  voxels[0])

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A soft block with a core, as a view knows it.
+// A soft block with a core, in the form that a view gets.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace tests {
 
-// 20 voxels of 1 mm along each axis, about the origin: gel (label 1) around a core (label 2) of 10 voxels.
+// 20 voxels of 1 mm along each axis, about the origin. Gel (label 1) surrounds a core (label 2) of 10 voxels.
 inline hybrid::DrawnInside cored_block() {
   voxel::LabelVolume volume{.dims = {20, 20, 20}, .spacing_m = glm::dvec3(1e-3), .labels = {}};
   for (int k = 0; k < 20; ++k) {

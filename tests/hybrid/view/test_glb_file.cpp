@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Binary glTF, read by a parser of its own: it knows the specification (glTF 2.0, Khronos Group), not the
-// writer.
+// Binary glTF, read by a parser that follows the specification (glTF 2.0, Khronos Group) and shares no code
+// with the writer.
 #include "hybrid/view/glb_file.h"
 
 #include <cmath>
@@ -23,11 +23,11 @@ struct GlbMesh {
   json material;
   std::vector<glm::dvec3> points{}, normals{}, colours{};  // as stored; colours may be empty
   std::vector<std::uint32_t> indices{};
-  glm::dvec3 shift{0.0};  // of its node
+  glm::dvec3 shift{0.0};  // translation of the mesh's node
 };
 struct GlbScene {
   json gltf;
-  glm::dquat turn{1.0, 0.0, 0.0, 0.0};  // of the uppermost node
+  glm::dquat turn{1.0, 0.0, 0.0, 0.0};  // rotation of the top node
   std::vector<GlbMesh> meshes{};
 };
 
@@ -38,7 +38,7 @@ std::uint32_t word(const std::string& bytes, std::size_t at) {
   return value;
 }
 
-// An array of one accessor, as rows of numbers. Checks what section 3.6 demands of it.
+// An array of one accessor, as rows of numbers. Checks the conditions of section 3.6.
 template <typename Number>
 std::vector<std::vector<Number>> read_array(const json& gltf, const std::string& binary, std::size_t number,
                                             const std::string& type, int component, int target) {
@@ -71,7 +71,7 @@ std::vector<glm::dvec3> read_vectors(const json& gltf, const std::string& binary
   return out;
 }
 
-// The bounds that an accessor of positions states are those of its values.
+// An accessor of positions must state the bounds of its values.
 void expect_bounds(const json& accessor, const std::vector<glm::dvec3>& points) {
   for (int a = 0; a < 3; ++a) {
     const auto axis = static_cast<std::size_t>(a);
@@ -105,7 +105,7 @@ GlbMesh read_mesh(const json& gltf, const std::string& binary, const json& node)
   return out;
 }
 
-// Container: section 4.4. Then the nodes of the scene.
+// Reads the container (section 4.4), then the nodes of the scene.
 GlbScene read_glb(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
@@ -175,7 +175,7 @@ TEST_F(GlbFile, EveryTriangleLiesWhereItIsInTheSceneInMeters) {
       off = std::max(off, glm::distance(mesh.points[mesh.indices[i]] + mesh.shift, expected));
     }
     EXPECT_LT(off,
-              0.16 * std::pow(2.0, -24));  // half a unit in the last place of a float, of the object's size
+              0.16 * std::pow(2.0, -24));  // half a unit in the last place of a float as large as the object
   }
 }
 
@@ -192,7 +192,7 @@ TEST_F(GlbFile, NormalsPointToTheSideOfTheirTriangle) {
       const glm::dvec3 &a = mesh.points[mesh.indices[i]], &b = mesh.points[mesh.indices[i + 1]],
                        &c = mesh.points[mesh.indices[i + 2]];
       const glm::dvec3 across = glm::cross(b - a, c - a);
-      if (glm::length(across) < 1e-9) continue;  // at the poles of the balls two corners are one
+      if (glm::length(across) < 1e-9) continue;  // at the poles of the balls, two corners coincide
       for (std::size_t k = 0; k < 3; ++k)
         EXPECT_GT(glm::dot(glm::normalize(across), mesh.normals[mesh.indices[i + k]]), 0.5);
     }

@@ -64,7 +64,7 @@ TEST(Layout, MeasuresHowMuchNearerAViewIs) {
   EXPECT_NEAR(hybrid::times_nearer(far, scene, far, scene), 1.0, 1e-12);
 }
 
-// The scene measures 160 mm. A tool of 8 mm gets an inset, because it is larger there; one of 80 mm does not.
+// The scene measures 160 mm. A tool of 8 mm gets an inset that shows it larger. A tool of 80 mm gets none.
 using InsetPicture = tests::Picture;
 TEST_F(InsetPicture, IsThereOnlyIfItIsNearer) {
   for (const double radius : {4e-3, 4e-2}) {

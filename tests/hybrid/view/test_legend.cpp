@@ -45,7 +45,7 @@ Camera from_the_front(const Session& s) {
   return camera;
 }
 
-// Distance between two colours, without their brightness: shading only scales a colour.
+// Distance between two colours without their brightness, because shading only scales a colour.
 float hue_apart(const glm::vec3& a, const glm::vec3& b) {
   return glm::length(glm::normalize(a) - glm::normalize(b));
 }
@@ -61,7 +61,7 @@ bool has(const std::vector<LegendRow>& rows, const std::string& name) {
   return std::ranges::find(all, name) != all.end();
 }
 
-// As many objects as a composed body has: 25 bones, and tissue of 14 materials.
+// As many objects as in a composed body: 25 bones, and tissue of 14 materials.
 Session body() {
   Session s = two_halves();
   DrawnObject tissue = s.scene.objects[0];
@@ -243,7 +243,7 @@ TEST(Legend, CountsWhatDoesNotFit) {
   for (const std::size_t most : {1U, 5U, 6U, 8U, 12U, 17U, 60U}) {
     const auto rows = hybrid::legend_rows(s.scene, s.now, most);
     EXPECT_LE(rows.size(), std::max<std::size_t>(most, 5));
-    // Each material and each bone has its own row or is counted in one.
+    // Each material and each bone has its own row, or is counted in a row for several.
     std::size_t organs = 0, bones = 0, objects = 0;
     for (const LegendRow& row : rows) {
       const std::string& words = row.more.empty() ? row.name : row.more;
@@ -288,7 +288,7 @@ TEST(Legend, ListsAFewObjectsInTheirOrder) {
                                       "force on the hand"}));
 }
 
-// The legend hides the tool nowhere in the scene's view. The tool is dark; behind the legend's plate its
+// The legend hides the tool nowhere in the scene's view. The tool is dark. Behind the legend's plate its
 // pixel would be nearly white.
 TEST_F(MaterialPicture, TheLegendLeavesTheSceneFree) {
   Session s = body();

@@ -190,8 +190,8 @@ TEST_F(Picture, ColoursDisplacement) {
   Camera camera = tests::framed(s);
   camera.elevation_rad = 0.9;
   DRAW_OR_SKIP(image, s, small(camera));
-  // 16 mm beside the tool's axis the tissue is displaced by 6 mm, where the colour scale ends at 20 mm. 45 mm
-  // beside the axis it is hardly displaced.
+  // The colour scale ends at 20 mm. The tissue is displaced by 6 mm at 16 mm beside the tool's axis, and
+  // hardly at 45 mm beside the axis.
   const glm::dvec3 beside =
       camera.right() * 0.016 + glm::dvec3(0.0, 0.0, std::sqrt(0.0049 - 0.000256) - 0.0063);
   const glm::vec3 own = hybrid::palette::of_object(s.scene, 1);

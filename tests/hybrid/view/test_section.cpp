@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cut through an object that hides a material: what a built scene stores of its inside, and when and
-// where it is cut.
+// The cut through an object that hides a material: the stored inside of a built scene, and the conditions and
+// the place of the cut.
 #include "hybrid/view/tissue/section.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ using tests::Session;
 using InsideOf = tests::SceneFile;
 using CutPicture = tests::Picture;
 
-// A block of voxels of 20 mm: gel around a core of 10 mm. It has the surface of a ball, and a tool above it.
+// A block of 20 mm, with gel around a core of 10 mm. Its drawn surface is a ball, and a tool is above it.
 Session cored() {
   Session s;
   s.scene.tool_radius_m = 3e-3;
@@ -36,7 +36,7 @@ Session cored() {
   s.now.force_N = {0.0, 0.0, 1.0};
   s.now.feel = {{true, 1.0}};
   s.now.inside.resize(1);
-  s.now.inside[0].used = true;  // no displacements: the block is at rest
+  s.now.inside[0].used = true;  // without displacements, the block is at rest
   return s;
 }
 

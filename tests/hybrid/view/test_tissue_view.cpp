@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a view asks a session for, and what it makes of the answer: slices, values, scales, grey values.
+// The questions of a view to a session, and the slices, values, scales and grey values made of the answers.
 #include "hybrid/view/tissue_view.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ using hybrid::ViewSettings;
 using TissueOfScan = tests::SceneFile;
 using SlicedPicture = tests::Picture;
 
-// The cored block as the only object, with its corners as its surface.
+// The cored block as the only object. Its drawn surface is the ball through its corners.
 tests::Session block() {
   tests::Session s;
   s.scene.tool_radius_m = 3e-3;
@@ -39,7 +39,7 @@ tests::Session block() {
   return s;
 }
 
-// Answers a view's questions: all tissue moves by a linear map.
+// Answers a view's questions. All tissue moves by a linear map.
 void answer(hybrid::Snapshot& now, const hybrid::AskedPoints& asked, const glm::dmat3& gradient) {
   now.asked.number = asked.number;
   now.asked.moved_m.assign(asked.at_rest_m.size(), {});
@@ -108,7 +108,7 @@ TEST(TissueViewOf, ColoursSurfaceAndSlicesByStrain) {
   answer(s.now, *tissue.asked(), stretched(-0.002));
   tissue.take(s.now);
   EXPECT_DOUBLE_EQ(tissue.scale().end, 0.05) << "a scale does not fall";
-  view.colour = TissueColour::limits;  // the same points serve
+  view.colour = TissueColour::limits;  // needs the same points
   const std::uint64_t number = tissue.asked()->number;
   tissue.set(view);
   EXPECT_EQ(tissue.asked()->number, number);
@@ -178,7 +178,7 @@ TEST(SliceFrames, AreGrabbedAtTheirHandleAndFollowThePointer) {
     const glm::dvec2 handle = *layout.pixel(camera, frame.handle_m());
     EXPECT_EQ(hybrid::slice_at(frames, camera, where, handle, 16.0F), frame.axis);
     EXPECT_FALSE(hybrid::slice_at(frames, camera, where, handle + glm::dvec2(60.0, 0.0), 16.0F).has_value());
-    // The pointer moves to where the handle would be a little further along the axis.
+    // The pointer moves to the place of a handle that is a little further along the axis.
     ViewSettings further = view;
     further.slices[frame.axis].share = 0.56;
     const glm::dvec2 there = *layout.pixel(camera, hybrid::slice_frames(box, further)[frame.axis].handle_m());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Frames that draw only what changed show the same as frames that draw everything.
+// Frames that draw only the changes show the same as frames that draw everything.
 #include "hybrid/view/view_changes.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ hybrid::PictureOptions quick(const Session& s) {
   return options;
 }
 
-// The ball is pressed by the tool at `at`, `deep` metres deep.
+// The tool presses the ball at `at`, to a depth of `deep` (m).
 void press(Session& s, const glm::dvec3& at, double deep) {
   const glm::dvec3 inwards = -glm::normalize(at);
   s.now.proxy_m = at + deep * inwards;
@@ -53,8 +53,8 @@ void press(Session& s, const glm::dvec3& at, double deep) {
   }
 }
 
-// The frames of one maker, and each frame by a maker of its own. A maker's context is current until the next
-// maker comes, so the first one ends before.
+// The frames of one maker, and each frame by a maker of its own. Each maker makes its own context current, so
+// the first maker is destroyed before the others are made.
 struct Frames {
   std::vector<std::vector<std::uint8_t>> in_turn, anew;
 };
@@ -93,7 +93,7 @@ TEST(ViewChanges, APressThatMovesShowsTheSameAsFramesDrawnAnew) {
   for (std::size_t n = 0; n < shots.size(); ++n) {
     const double error = share_that_differs(frames->in_turn[n], frames->anew[n]);
     EXPECT_LT(error, 5e-4) << n;
-    // The frames do change.
+    // Successive frames differ, so the comparison is not empty.
     if (n == 0) continue;
     EXPECT_GT(share_that_differs(frames->anew[n], frames->anew[n - 1]), 4.0 * error) << n;
   }

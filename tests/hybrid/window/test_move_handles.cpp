@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The arrows by which an object is moved: they follow the pointer, along their axis alone.
+// The arrows that move an object follow the pointer, but only along their axis.
 #include "hybrid/window/move_handles.h"
 
 #include <gtest/gtest.h>

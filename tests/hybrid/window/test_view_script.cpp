@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scripts that control the window: what each command does, and which lines are refused.
+// Scripts that control the window: the effect of each command, and the refused lines.
 #include "hybrid/window/view_script.h"
 
 #include <gtest/gtest.h>

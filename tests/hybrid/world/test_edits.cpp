@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Edits of a running session: their ranges, and that an edited value is felt like the same value in the scene
-// file.
+// Edits of a running session: their ranges, and their effect. An edited value is felt like the same value in
+// the scene file.
 #include "hybrid/world/edits.h"
 
 #include <gtest/gtest.h>

@@ -71,7 +71,7 @@ TEST(FreeBody, DragSlowsItExponentially) {
   EXPECT_LT(state.velocity_m_per_s.x, 1e-4 * before);
 }
 
-// A push through the centre causes no rotation; any other push causes one in proportion to its lever arm. A
+// A push through the centre causes no rotation. Any other push causes one in proportion to its lever arm. A
 // step transfers the full momentum, however light the body is.
 TEST(FreeBody, TakesTheMomentumOfWhatPushesIt) {
   std::mt19937_64 random(4);
@@ -96,8 +96,8 @@ TEST(FreeBody, TakesTheMomentumOfWhatPushesIt) {
   }
 }
 
-// Without torque, momentum and energy stay constant to rounding over 20 s, for every shape, also when it
-// turns about its unstable axis.
+// Without torque, momentum and energy of every shape stay constant to rounding over 20 s. This holds also for
+// turns about the unstable axis.
 TEST(FreeBody, TurnsByItselfWithoutLossOrGain) {
   const std::array<dvec3, 4> shapes{dvec3(0.01, 0.02, 0.05), dvec3(0.05, 0.05, 0.001),
                                     dvec3(0.001, 0.001, 0.1), dvec3(0.03)};
@@ -136,7 +136,7 @@ TEST(FreeBody, PrecessesAtTheRateOfTheTop) {
   EXPECT_LE(glm::distance(state.rotation * axis, expected), 1e-5);
 }
 
-// A springy floor that pushes each corner of a body which is below it, and never pulls.
+// A springy floor. It pushes each corner of a body that is below the floor, and never pulls.
 struct Springs {
   dvec3 half_size{0.005};
   double floor_m = 0.0;  // z
@@ -196,7 +196,7 @@ TEST(FreeBody, StiffContactsNeverGiveALightBodyEnergy) {
 }
 
 // A body that hits with its corners also rotates. A corner moves along an arc, which the step approximates by
-// a line; the error is of second order in the rotation of one tick. Energy may vary by that much, and the
+// a line. The error is of second order in the rotation of one tick. Energy may vary by that much, and the
 // body must still come to rest.
 TEST(FreeBody, StiffContactsAtCornersNeverMakeALightBodyFly) {
   std::mt19937_64 random(8);
@@ -256,7 +256,7 @@ TEST(FreeBody, RestsWhereForcesBalance) {
   }
 }
 
-// Contacts push and never pull: a contact does not slow down a body that leaves it.
+// Contacts push and never pull, so a contact does not slow down a body that leaves it.
 TEST(FreeBody, ContactsLetGo) {
   const FreeBody body = box_body(dvec3(0.01), 1e-3);
   FreeBodyState state;

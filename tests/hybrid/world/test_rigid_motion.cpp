@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The pose of a rigid object at a given time, how far it travels, and how its motion gets from the scene file
-// into the world.
+// The pose of a rigid object at a given time, the distance that it travels, and the transfer of its motion
+// from the scene file into the world.
 #include "hybrid/world/rigid_motion.h"
 
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes mesh files: fuzz_mesh --seconds N --seed S [--keep DIR] [FILE…]. If files are named, only these are
-// tested, unchanged. Otherwise inputs are mutated in batches, each batch in its own
-// process. An input that crashes, violates an invariant or takes too long is written to DIR, and the next
-// batch continues. An input with new behaviour (other findings, another error) joins the pool and is mutated
-// further. The same seed makes the same inputs. Build it with sanitizers (preset asan), because other builds
-// do not show memory errors.
+// tested, unchanged. Otherwise inputs are mutated in batches, each batch in its own process. An input that
+// crashes, violates an invariant or takes too long is written to DIR, and the next batch continues. An input
+// with new behaviour (other findings, another error) joins the pool and is mutated further. The same seed
+// makes the same inputs. Build it with sanitizers (preset asan), because other builds do not show memory
+// errors.
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>

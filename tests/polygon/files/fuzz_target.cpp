@@ -152,8 +152,8 @@ FuzzOutcome fuzz_file(const std::filesystem::path& file) {
   add(outcome.signature, after.findings);
   const bool doubled = std::any_of(before.findings.begin(), before.findings.end(),
                                    [](const Finding& f) { return f.id.starts_with("M03"); });
-  // If a sheet has two coincident faces, one for either side, repair keeps only one. The mesh was closed by
-  // its edge counts and becomes an open sheet.
+  // If a sheet has two coincident faces, one for either side, repair keeps only one. By its edge counts the
+  // mesh was closed, and repair makes it an open sheet.
   must(after.closed || !before.closed || doubled, "repair opens no closed mesh");
   touch(repaired.mesh, after.oriented);
   return outcome;

@@ -9,7 +9,7 @@
 namespace tests {
 
 struct FuzzOutcome {
-  bool loaded = false;   // false: refused in words
+  bool loaded = false;   // false: refused with a message
   std::size_t size = 0;  // as loaded: triangles of a mesh, entries of another file
   // Summary of the behaviour: ids of findings and repairs, or the error text without its numbers. Two inputs
   // with the same signature test similar code.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Randomly damaged files, with a fixed seed: each ends in a mesh or in a MeshError.
+// Randomly damaged files, with a fixed seed. Each ends in a mesh or in a MeshError.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

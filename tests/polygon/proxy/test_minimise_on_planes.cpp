@@ -21,7 +21,7 @@ using polygon::ContactPlane;
 using polygon::minimise_on_planes;
 using polygon::PlaneMinimum;
 
-constexpr double kTolerance = 1e-15;  // m; of the planes: 1e-12 times the radius of a tool of 1 mm
+constexpr double kTolerance = 1e-15;  // of the planes (m), 1e-12 times the radius of a tool of 1 mm
 
 dvec3 random_vector(std::mt19937_64& random, double size) {
   std::normal_distribution<double> normal(0.0, size);
@@ -98,8 +98,7 @@ std::optional<dvec3> on_subset(const dvec3& target, const dmat3& metric,
   return q;
 }
 
-// The least cost over all subsets whose minimum violates no plane by more than `allowed`. Empty if there is
-// none.
+// The cheapest of the subsets' minima that violate no plane by more than `allowed`. Empty if there is none.
 std::optional<dvec3> brute_force(const dvec3& target, const dmat3& metric,
                                  const std::vector<ContactPlane>& planes, double allowed) {
   std::optional<dvec3> best;
@@ -119,7 +118,8 @@ std::optional<dvec3> brute_force(const dvec3& target, const dmat3& metric,
   return best;
 }
 
-// Feasible; on its active planes; non-negative multipliers; the gradient is the multipliers' sum of normals.
+// Expects a feasible point on its active planes, with multipliers of at least 0. The gradient must be the sum
+// of the normals, weighted by the multipliers.
 void expect_first_order(const PlaneMinimum& found, const dvec3& target, const dmat3& metric,
                         const std::vector<ContactPlane>& planes, double size) {
   ASSERT_LE(found.active_count, 3U);

@@ -57,7 +57,7 @@ TEST_P(NeighbourhoodTest, MissesNothingThatABallCouldTouchInIt) {
   }
 }
 
-// A point that violates no plane is clear of every element, and so is the straight step there.
+// A point that violates no plane is clear of every element. So is the straight path to this point.
 TEST_P(NeighbourhoodTest, WhatBreaksNoPlaneIsClear) {
   Neighbourhood near;
   int clear = 0;
@@ -94,7 +94,7 @@ TEST_P(NeighbourhoodTest, SeparatingPlanesHaveTheirElementBehindThem) {
       }
     }
     // The plane is perpendicular to the shortest line from the view to the element. Its distance from the
-    // view is the greatest possible: a ball on the plane would just touch the element.
+    // view is the greatest possible. A ball on the plane would just touch the element.
     EXPECT_NEAR(plane.offset - radius(), glm::dot(plane.normal, view) - distance(t, view), 1e-12);
     if (flat) {
       EXPECT_GE(glm::dot(own.normal, view), own.offset - 1e-15);

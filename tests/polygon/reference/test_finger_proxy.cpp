@@ -94,8 +94,8 @@ double distance(const TriangleMesh& mesh, const dvec3& p) {
   return static_cast<double>(least);
 }
 
-// The part of the way at which the distance falls to the radius: steps of the room that is left cannot pass
-// it (conservative advancement). Above 1: never.
+// The fraction of the way at which the distance falls to the radius, or more than 1 if it never does. No step
+// is longer than the distance that is left, so none passes the contact (conservative advancement).
 double meets_at(const TriangleMesh& mesh, const dvec3& from, const dvec3& to, double radius) {
   const double length = glm::length(to - from);
   double part = 0.0;
@@ -128,7 +128,7 @@ TEST(TriangleTree, ABallStopsWhereItsDistanceFallsToTheRadius) {
         continue;
       }
       ++hits;
-      // Advancement stops within 1e-10 of the radius: earlier, where the ball grazes.
+      // Advancement stops within 1e-10 of the radius. Where the ball grazes, this is well before the contact.
       const dvec3 at = from + hit.part * (to - from);
       EXPECT_NEAR(distance(mesh, at), radius, 1e-9);
       EXPECT_GE(hit.part, expected - 1e-9);
@@ -188,12 +188,12 @@ TEST(FingerProxy, InACornerItEndsAtTheNearestFreePlace) {
   }
 }
 
-// Goals near a face, an edge and a vertex of the box, whose nearest place outside is there.
+// Goals beside a face, an edge and a vertex of the box. The closest point of the box lies on this feature.
 TEST(FingerProxy, AtABoxItEndsAtTheClosestPoint) {
   const TriangleTree tree(box_mesh());
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> part(0.1, 0.8);
-  for (int feature = 1; feature <= 3; ++feature) {  // axes along which the goal lies beyond the box
+  for (int feature = 1; feature <= 3; ++feature) {  // number of axes on which the goal is outside the box
     for (int n = 0; n < 300; ++n) {
       dvec3 goal = random_in_cube(random, 0.9 * kHalf_m);
       for (int axis = 0; axis < feature; ++axis) goal[axis] = kHalf_m + part(random) * 0.5 * kBall_m;
@@ -221,7 +221,7 @@ TEST(FingerProxy, OffAFaceItGoesRoundTheEdge) {
   }
 }
 
-// A proxy that came to lie on the face itself would meet the rim of the next face, as in a concave edge.
+// Without the gap, a proxy on a face would be stopped by the rim of the next face, as at a concave edge.
 TEST(FingerProxy, AGoalOnTheFaceItselfKeepsTheGap) {
   const TriangleTree tree(box_mesh());
   dvec3 proxy(0.04, 0.0, 0.06);

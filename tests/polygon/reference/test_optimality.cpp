@@ -184,7 +184,8 @@ TEST(Optimality, AProxyTooFarOffIsNotFoundButHasAtLeastThatError) {
 
 TEST(Optimality, OptimaAcrossASheetDoNotCountAndThoseAroundAnEdgeDo) {
   // The goal is above the sheet. For a proxy below the sheet, the optimum is at the sheet. For a proxy 10 nm
-  // above the sheet, that optimum is 10 to 20 nm away, but it does not count: it lies across the sheet.
+  // above the sheet, that optimum is 10 to 20 nm away, but it does not count, because it lies across the
+  // sheet.
   const OptimalityReference sheet(make_plane_mesh(1.0, 1));
   const NearestOptimum across = sheet.nearest_optimum({0.1, 0.2, 0.3}, {0.1, 0.2, 1e-8}, 0.0, 1e-3);
   ASSERT_TRUE(across.found);

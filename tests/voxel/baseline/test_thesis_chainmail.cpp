@@ -209,7 +209,7 @@ Sources random_sources(Random& random, bool homogeneous, std::size_t count) {
     std::vector<double> low(c.volume.labels.size(), -1e300), high(c.volume.labels.size(), 1e300);
     for (std::size_t s = 0; s < count; ++s) {
       const std::size_t v = c.volume.index(c.at[s][0], c.at[s][1], c.at[s][2]);
-      // The second source stays within the interval that the first one leaves it. Mostly it moves in the
+      // The second source stays within the interval that the first source leaves. Mostly it moves in the
       // opposite direction.
       const double wanted = (s == 0 ? 1.0 : -0.9) * random.between(0.0, 2e-3);
       const double u = std::clamp(wanted, low[v] + 1e-9, high[v] - 1e-9);

@@ -53,8 +53,8 @@ struct Strips {
   }
 };
 
-// [label] random half limits of labels 1 to 39. All other entries are large: label 0 has no links, and labels
-// above 39 do not occur.
+// [label] random half limits of labels 1 to 39. All other entries are large, because label 0 has no links and
+// labels above 39 do not occur.
 std::vector<float> halves(std::mt19937& random) {
   std::uniform_real_distribution<float> limit(0.01F, 0.2F);
   std::vector<float> out(256, 1e30F);

@@ -123,7 +123,7 @@ TEST(CompositeGrid, PatchesInOtherShapes) {
   EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, hollow, below), patch), 0.07);
 }
 
-// The result does not depend on where the patches were before, or on the path of the tool.
+// The result does not depend on earlier places of the patches, or on the path of the tool.
 TEST(CompositeGrid, ThePathThereIsForgotten) {
   const int n = 64;
   const Body body({n, n, n}, 0.1, everywhere, below);
@@ -246,13 +246,14 @@ TEST(CompositeGrid, PatchesWithAnchorsAnywhere) {
   EXPECT_LT(anchored_by(everywhere, cube(22, 37, 0, 4)), 0.08);
 }
 
-// The trial of an object also presses parts one voxel thick in air, which fill no coarse cell. Compared with
-// all voxels on level 0, the force on a voxel is never off by twice what the trial says.
+// The trial of an object also presses parts that are one voxel thick, which fill no coarse cell. The
+// reference has all voxels on level 0. The force error at any voxel must be less than twice the error of the
+// trial.
 TEST(CompositeGrid, TheTrialFindsTheErrorOfThinParts) {
   constexpr int kDim = 40, kCycles = 60;
   constexpr double kDepth = 0.04 * kSpacing;
-  constexpr double kScale = 0.1 * kDim * kSpacing / kDepth;  // to the press that the trial judges
-  constexpr double kLeast_N = 0.57;                          // the trial's errors are relative to it or more
+  constexpr double kScale = 0.1 * kDim * kSpacing / kDepth;  // scales a force to the trial's press
+  constexpr double kLeast_N = 0.57;                          // errors are relative to this force at least
   using Filled = std::function<bool(const Index3&)>;
   const Filled fins = [](const Index3& p) { return p[2] < 20 || p[0] % 4 == 0; };
   const Filled rods = [](const Index3& p) { return p[2] < 24 || (p[0] % 6 == 3 && p[1] % 6 == 3); };

@@ -25,7 +25,8 @@ using voxel::LinkMaterial;
 using Index3 = CompositeGrid::Index3;
 
 // Layers and lumps of tissues whose stiffnesses differ by factors of 4 to 200. Soft layers between stiff ones
-// reach their limits. The depth is a fraction of that at which all links below the square do so.
+// reach their limits. The depth is a fraction of the depth at which all links below the
+// square reach their limits.
 int stiff_soft_stiff(const Index3& p) {
   return p[2] < 4 || p[2] >= 9 ? 4 : 1;
 }
@@ -146,7 +147,7 @@ TEST(CompositeGrid, PatchesInSeveralTissues) {
   EXPECT_LT(patches_against_all(Body({n, n, n}, 0.1, everywhere, below, core), patch), 0.04);
 }
 
-// The lattice's limits are those of its voxels, a coarse level's are means over the tissue round its nodes.
+// The lattice has the limits of its voxels. A coarse level has means over the tissue around its nodes.
 TEST(CompositeGrid, PatchesInTissuesWithLimitsOfTheirOwn) {
   const int n = 64;
   const PressedSquare patch{{n / 2, n / 2, n - 1}, 4, 2.5 * kSpacing};

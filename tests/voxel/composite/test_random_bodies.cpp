@@ -54,7 +54,8 @@ bool in_any(const std::vector<Box>& boxes, const Index3& p) {
   return std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) { return box.has(p); });
 }
 
-// share: depth of the press, as a share of that at which `links` links below the square are at their limits.
+// `share` is the depth of the press, relative to the depth at which `links` links below the square reach
+// their limits.
 struct RandomBody {
   std::vector<Box> holes, anchors;
   std::vector<std::pair<Box, int>> tissues;  // box, stiffness

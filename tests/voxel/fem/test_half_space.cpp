@@ -163,7 +163,7 @@ TEST(HalfSpace, ABallAndAPunchAreHertzs) {
 
 // The remaining error is due to the finite block and is inversely proportional to its width. Extrapolated to
 // infinite width, the forces are those of the half-space. The punch has an effective radius, 0.11 spacings
-// smaller than that of a circle with its voxels' area. The reason: the effective edge of a straight row of
+// smaller than that of a circle with its voxels' area. The effective edge of a straight row of
 // nodes lies 0.25 to 0.28 spacings outside the nodes (from the factors of the surface's Wiener-Hopf problem).
 // The voxels' area ends half a spacing outside. The steps of a circle's edge reduce this difference to 0.11
 // spacings.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Blocks whose axes do not lie along the lattice: how far the lattice's directions change their stiffness.
+// Blocks whose axes do not lie along the lattice: the effect of the lattice's directions on their stiffness.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -43,7 +43,7 @@ TEST(ReferenceBlock, TheAccurateEnergyIsTheFiniteElements) {
 
 // A nearly incompressible block. With volumetric locking, the elements would be far too stiff on a coarse
 // grid, and less so at a smaller spacing. Without locking, the spacing changes the force as little as at ν =
-// 0.3. There it changes the force by 3 %.
+// 0.3, by 3 %.
 TEST(ReferenceBlock, TheAccurateEnergyDoesNotLockInVolume) {
   const tests::ReferenceRow coarse{"hom", 0.005, 0.04, 0.499, 0.0}, fine{"hom", 0.0025, 0.04, 0.499, 0.0};
   const double at_coarse = tests::pressed_block(coarse, Energy::accurate),

@@ -169,7 +169,7 @@ TEST(LinkModuli, ASheetOnABlockIsHeldInTheAccurateEnergy) {
   }
   ASSERT_TRUE(problem.solve(1e-10));
   // The sheet is five links high and seven wide. The outermost links count half, so six links act in
-  // parallel. `alone` is the sheet's energy on a rigid base; the block below is softer.
+  // parallel. `alone` is the sheet's energy on a rigid base. The block below is softer.
   const double alone = 0.5 * 6.0 * 1e4 * 1e-3 / 5.0 * 1e-8;
   EXPECT_LT(problem.energy_J(), 3.0 * alone);
   EXPECT_GT(problem.energy_J(), 0.3 * alone);
@@ -178,7 +178,7 @@ TEST(LinkModuli, ASheetOnABlockIsHeldInTheAccurateEnergy) {
     EXPECT_GT(problem.u[body.at(3, 3, k)].z(), problem.u[body.at(3, 3, k - 1)].z()) << k;
 }
 
-// The energy of a rigid rotation by θ. Bricks are exact for small rotations only: they have a strain of 1 −
+// The energy of a rigid rotation by θ. Bricks are exact for small rotations only. They have a strain of 1 −
 // cos θ in two directions, 1.5 % at 10 degrees. Six links also have the shear sin θ across them.
 TEST(LinkModuli, RotationsCostWhatTheyDo) {
   constexpr int n = 4;

@@ -97,8 +97,8 @@ TEST(Yield, SpendsTheAreaOfItsLoop) {
   EXPECT_NEAR(work, 4 * k * y * (amplitude - y), 1e-3 * work);
 }
 
-// A bar of links in a row between a wall and a hand. sweep() is Gauss-Seidel on the energy of the step:
-// bisection finds, for each voxel, the place where the forces of its two links are equal.
+// A bar of links in a row between a wall and a hand. sweep() is Gauss-Seidel on the energy of the step.
+// For each voxel, bisection finds the place where the forces of its two links are equal.
 struct Bar {
   std::vector<double> k, y, offset, u;
 
@@ -153,7 +153,8 @@ TEST(Yield, ABarKeepsWhatItsWeakestLinkDoes) {
   }
 }
 
-// Shows why offsets are updated only at rest: just after a pull, all of the elongation is in the last link.
+// Offsets are updated only at rest. Just after a pull, all of the elongation is in the last link, which would
+// yield although no link yields at rest.
 TEST(Yield, OffsetsKeptOnTheWayKeepTheWayToo) {
   const std::vector<double> k(8, 10.0), y(8, 0.2);
   Bar waits(k, y), hurries(k, y);

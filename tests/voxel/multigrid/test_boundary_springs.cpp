@@ -228,8 +228,8 @@ TEST(BoundarySprings, WhatSlidesHoldsAlongItsNormalAlone) {
   }
 }
 
-// A boundary spring never pushes a cell away from rest, however surfaces are inclined: its matrix is positive
-// semidefinite.
+// A boundary spring never pushes a cell away from rest, however surfaces are inclined. So its matrix is
+// positive semidefinite.
 TEST(BoundarySprings, NeverPush) {
   LatticeOptions options;
   options.materials[1] = elastic(1e4, 0.3);

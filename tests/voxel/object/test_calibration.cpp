@@ -139,8 +139,8 @@ Felt punch(double a, double poisson) {
   tool.radius = (a + 1e-3) * kH;
   tool.centre = {0.0, 0.0, corner.soft.top() + corner.soft.object->voxel_radius() - depth};
   const double found = corner.felt(tool).force_N.z;
-  // number of voxels of the whole punch: a voxel inside the quarter stands for four, one on a face for two,
-  // the one on the edge for one
+  // The number of voxels of the whole punch. A voxel inside the quarter stands for four, a voxel on a face
+  // for two, and the voxel on the edge for one.
   double voxels = 0.0;
   for (const VoxelId v : corner.held) {
     const auto c = corner.soft.lattice->coordinates(v);

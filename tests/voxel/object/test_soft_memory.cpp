@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Memory of a soft object. It is little more than its labels until it is touched, and always as much as
-// memory_bytes() reports.
+// Memory of a soft object. Until it is touched, an object takes little more memory than its labels. It always
+// takes as much as memory_bytes() reports.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -115,7 +115,7 @@ TEST(SoftMemory, WhatItSaysIsWhatTheProcessTakesAlsoWhereItIsTouched) {
   }
 }
 
-// A lattice that takes over its volume equals one that copies it, and it frees the volume's memory.
+// A lattice that takes over a volume equals a lattice that copies the volume, and frees the volume's memory.
 TEST(SoftMemory, AVolumeThatIsGivenAwayGivesItsMemoryBack) {
   LabelVolume volume = block({100, 90, 70}, glm::dvec3(kH));
   tests::Random random(12);

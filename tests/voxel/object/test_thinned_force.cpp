@@ -25,8 +25,8 @@ struct Block {
   int cover;         // voxels of tissue above the bone
   double ratio;      // modulus of bone, divided by the modulus of tissue
   bool embedded;     // true: a slab of bone with tissue around it; false: all below the cover is bone
-  int every, shell;  // of ThinningOptions; every 0: not thinned
-  int high;          // voxels
+  int every, shell;  // as in ThinningOptions; every = 0: not thinned
+  int high;          // height (voxels)
 };
 
 constexpr int kWide = 48;

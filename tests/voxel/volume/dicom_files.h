@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// DICOM files of the base volume (base_volume.h), made by hand. They exist in both byte orders, with and
-// without types, as one file per slice or as one file of all frames. Labels are stored times 100.
+// DICOM files of the base volume (base_volume.h), made by hand. They exist in both byte orders, with
+// explicit or implicit types, as one file per slice or as one file of all frames. Labels are stored times
+// 100.
 #pragma once
 
 #include <array>

@@ -76,7 +76,7 @@ TEST(Formula, BallHasItsVolumeAndHoldsExactlyTheCentresInside) {
         }
       }
     }
-    // The lattice misses no voxel: one more voxel at either end would have its centre outside the shape.
+    // The lattice misses no voxel. One more voxel at either end would have its centre outside the shape.
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_LT(volume.origin_m[axis] - volume.spacing_m[axis], -0.5 * diameter + 1e-12);
     }

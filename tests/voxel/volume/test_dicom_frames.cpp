@@ -41,8 +41,8 @@ class DicomFrames : public tests::VolumeFolder {
     for (const std::string& note : voxel::read_volume_header(path).notes) all += note + "\n";
     return all;
   }
-  // Expects that the folder holds the base volume, with labels times 100 and 2 mm voxels, from (-10, -20, 30)
-  // mm on.
+  // Expects that the folder holds the base volume, with labels times 100 and 2 mm voxels. The first voxel
+  // must be at (-10, -20, 30) mm.
   static void expect_base(const fs::path& path, const std::string& what) {
     voxel::VolumeFileOptions options;
     options.rules = {{100, 100, 1}, {200, 200, 2}, {300, 300, 3}};
@@ -84,7 +84,7 @@ TEST_F(DicomFrames, EachFrameHasItsOwnRescaling) {
   EXPECT_SAYS(refusal_of(folder({with_preamble(zero)})), "rescale slope is 0");
 }
 
-// A slope by slice, as PET scanners write it.
+// One slope for each slice, as PET scanners write it.
 TEST_F(DicomFrames, EachSliceHasItsOwnRescaling) {
   const DicomText text;
   const std::array<double, 8> slopes{1.0, 0.5, 0.25, 2.0, 4.0, 0.1, 0.4, 0.5};

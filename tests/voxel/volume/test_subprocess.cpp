@@ -11,7 +11,7 @@
 
 namespace {
 
-// A pipe whose writing end only the subprocess and its caller hold: it is closed when both have ended.
+// Only the subprocess and its caller hold the pipe's writing end. So it is closed when both have ended.
 TEST(Subprocess, EndsWithItsCaller) {
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe(ends.data()), 0);

@@ -112,7 +112,7 @@ TEST_F(VolumeHeaders, SpacesOfNrrdWithTimeAreTheSame) {
     const glm::dvec3 origin = glm::dvec3(-10.0, -20.0, 30.0) * c.from_ras;
     expect_base(write("v.nrrd", nrrd_file(vectors(step, origin, c.name, "", true))), c.name);
   }
-  // A fourth axis along time. One entry is accepted; two entries are not a single volume.
+  // A fourth axis along time. One entry is accepted. Two entries are not a single volume.
   const auto with_axis = [](int times) {
     const std::string data = tests::base_voxels<std::uint8_t>();
     return "NRRD0005\ntype: uint8\ndimension: 4\nsizes: 12 10 8 " + std::to_string(times) +
@@ -298,7 +298,7 @@ TEST_F(VolumeHeaders, AQuaternionOfNiftiThatIsNoRotationIsRefused) {
   file.quaternion = {0.0F, 0.0F, 1.00005F};  // half a turn about z, up to rounding
   EXPECT_EQ(refusal_of(write_it()), "");
   file.quaternion = {1.0F, 1.0F, 1.0F};
-  file.sform = 1;  // the one that is used
+  file.sform = 1;  // the sform is used
   expect_base(write_it(), "sform");
   EXPECT_SAYS(notes_of(in_folder("v.nii")), "different places");
 }
@@ -353,7 +353,7 @@ TEST_F(VolumeHeaders, ASingleSliceIsAsThickAsItSays) {
     const std::array<std::int16_t, 4> dims{axes, 12, 10, 1};
     std::memcpy(&bytes[40], dims.data(), sizeof(dims));
     std::memcpy(&bytes[88], &thickness, sizeof(thickness));
-    std::memcpy(&bytes[320], &thickness, sizeof(thickness));  // the sform's
+    std::memcpy(&bytes[320], &thickness, sizeof(thickness));  // of the sform
     return write("v.nii", bytes);
   };
   for (const bool sform : {true, false}) {

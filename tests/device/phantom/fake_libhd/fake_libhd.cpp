@@ -182,7 +182,7 @@ void hdEndFrame(unsigned /*handle*/) {
   const std::lock_guard lock(frames);
   if (!in_frame) ++control.misuse;
   in_frame = false;
-  // A frame outside the callbacks counts too: another thread opens it after giving up on the scheduler.
+  // A frame outside the callbacks counts too. A thread that has given up on the scheduler opens such a frame.
   if (!in_synchronous && force_set) {
     control.forces.push_back({control.ticks, {frame_force[0], frame_force[1], frame_force[2]}});
     if (control.last_force != nullptr) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A test double of libHD: a complete device behind the driver's C interface, with its own scheduler thread. A
-// test loads the same library file as the program and finds `fake_hd` in it. It writes the events that shall
-// happen into that struct.
+// test loads the same library file as the program and finds `fake_hd` in it. The test writes the events that
+// shall happen into this struct.
 #pragma once
 
 #include <atomic>
@@ -43,7 +43,7 @@ struct FakeHd {
   std::uint64_t silent_at = never;
   double temperature = 0.2;
 
-  // The hand: y = y_mm + swing_mm · sin(2π · hz · t) in the device's frame (y is up), x and z stay.
+  // The hand moves along the device's y axis (up): y = y_mm + swing_mm · sin(2π · hz · t). x and z stay.
   double x_mm = 0.0, y_mm = 0.0, z_mm = 0.0, swing_mm = 20.0, hz = 1.0;
 
   // Observations.

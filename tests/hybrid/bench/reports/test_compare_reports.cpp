@@ -91,7 +91,7 @@ TEST(CompareReports, WhatTakesHalfAsLongAgainIsFoundAndNothingElse) {
   }
   EXPECT_EQ(overall, 2U);  // the median and p99
   EXPECT_GE(times, 4U * kMeshes);
-  // The figures of single rows follow, sorted by how much a user notices. The longest times come first,
+  // The figures of single rows follow, those that a user notices most first. These are the longest times,
   // because they grew most.
   EXPECT_EQ(comparison.figures[overall].key, "max_us");
   for (std::size_t i = overall + 1; i < times; ++i)

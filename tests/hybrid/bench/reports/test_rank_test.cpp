@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rank test against all permutations, and its approximation against the exact test. Also tests how often
-// two samples of the same distribution are called different.
+// The rank test against all permutations, and its approximation against the exact test. The rate of false
+// alarms on samples of the same distribution is tested too.
 #include "hybrid/bench/reports/rank_test.h"
 
 #include <gtest/gtest.h>
@@ -142,7 +142,7 @@ constexpr int kComparisons = 2000;
 // is the fraction of a run's noise that all its figures share.
 double called_changed(std::size_t runs, std::size_t figures, double common) {
   std::mt19937_64 random(17);
-  std::map<double, double> known;  // p by u; u alone decides, because no values tie
+  std::map<double, double> known;  // [u] p, which depends on u alone if no values tie
   std::normal_distribution<double> noise;
   int called = 0;
   for (int comparison = 0; comparison < kComparisons; ++comparison) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Results of `hybrid bench` of whole scenes: errors are those of `run` and `compare`, and rows say what they
-// are. Times are not checked.
+// Results of `hybrid bench` of whole scenes: errors equal those of `run`, and rows have the names of their
+// models. Times are not checked.
 #include "hybrid/bench/scenes/bench_scenes.h"
 
 #include <gmock/gmock.h>

@@ -54,8 +54,8 @@ TEST(ThesisStudy, ThePairIsOneBlockUnderOneHand) {
     touched.push_back(felt.contact_ticks);
   }
   EXPECT_GT(touched[0], 20U);
-  // Between two voxels the tool meets tissue up to half a spacing deeper, so that strokes touch it a little
-  // less long.
+  // Between two voxels the tool meets tissue up to half a spacing deeper, so contacts there are a little
+  // shorter.
   EXPECT_GE(touched[1], touched[0]);
   EXPECT_LE(2 * touched[1], 3 * touched[0]);
   const auto classic = hybrid::bench::play_classic(cube, kShort_s);

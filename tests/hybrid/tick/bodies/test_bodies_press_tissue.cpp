@@ -258,7 +258,8 @@ TEST_F(BodyTissue, SqueezedOntoBoneItStaysOutOfBoneAndComesBack) {
   const std::string plate =
       "[[rigid]]\nname = \"plate\"\nprimitive = \"box\"\nsize = [80, 60, 6]\nposition = [0, 0, -12]\n";
   for (const Shape& shape : shapes()) {
-    if (shape.name == std::string("small ball")) continue;  // as small as a voxel; pushes the voxels apart
+    if (shape.name == std::string("small ball"))
+      continue;  // it is as small as a voxel, and pushes the voxels apart
     for (const double along : {0.0, 10.0}) {
       for (const bool asynchronous : {false, true}) {
         const double speed = asynchronous ? 1000.0 : 200.0;

@@ -71,7 +71,7 @@ std::vector<dvec3> seen_points(const hybrid::RigidObject& object, std::mt19937& 
   return points;
 }
 
-// Depth of the objects a and b in each other (m). Sheets have none.
+// Depth of the objects a and b in each other (m). A sheet has no inside, so nothing is deep in it.
 class Overlap {
  public:
   Overlap(Touch& touch, std::size_t a, std::size_t b) : touch_(touch), pair_{a, b} {

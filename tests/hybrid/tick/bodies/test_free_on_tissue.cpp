@@ -122,8 +122,8 @@ TEST_F(FreeOnTissue, TwoBodiesInOneObjectComeToRestAndAreBothCarried) {
 }
 
 // The force that carries a body held at one place is the derivative of the springs' energy with respect to
-// that place, with either kind of relaxation. A free box at the same place may be carried by another force:
-// it may have turned, and other voxels then lie beside it.
+// that place, with either kind of relaxation. A free box at the same place may be carried by another force,
+// because it may have turned and may touch other voxels.
 TEST_F(FreeOnTissue, OnTightLinksABodyThatIsHeldIsCarriedByWhatItsWayTakes) {
   struct Case {
     std::string name, shape;

@@ -198,7 +198,7 @@ TEST_F(Motion, AFreeBodyHasNoMoreEnergyThanTheHandGave) {
   }
 }
 
-// A heavy body with drag, pushed steadily: the hand feels the drag.
+// The hand pushes a heavy body steadily, and feels its drag.
 TEST_F(Motion, APuckPushedSteadilyFeelsItsDrag) {
   const double drag = 20.0, speed = 0.05;
   RigidDescription puck = free(rigid("puck", hybrid::BoxPrimitive{{0.03, 0.03, 0.01}}), 0.05, drag);

@@ -20,7 +20,7 @@ using namespace tests;  // NOLINT(google-build-using-namespace): these tests use
 
 struct Slide {
   std::vector<double> degrees,
-      step_N;  // [tick] angle between force and sphere's normal; change of the force since the last tick
+      step_N;  // [tick] angle between force and sphere's normal; change of the force in this tick
   double least_N = 1e9, most_N = 0.0;
 };
 

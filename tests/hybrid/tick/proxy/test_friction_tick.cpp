@@ -20,7 +20,7 @@ struct Ramp {
   double breakaway = 0.0;              // tangent of the angle at which sliding began
   std::vector<double> sliding;         // [tick of the slide] tangent of the force's angle
   double crept_m = 0.0;                // travel of the proxy before sliding
-  std::vector<double> normal_degrees;  // between the reference normal and the ideal one
+  std::vector<double> normal_degrees;  // angles between the reference normal and the ideal normal
 };
 
 // Moves the device along device(tick) until the proxy has slid for `slide` ticks. Angles are between the

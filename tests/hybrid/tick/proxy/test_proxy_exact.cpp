@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The proxy on meshes that are hard for it, moved slowly, fast and by jumps. Exact kernels that share no code
-// with the proxy check four things. It is never inside, never passes through, is never nearer than its
-// radius, and is at an optimum.
+// with the proxy check four things. The proxy is never inside, never passes through, is never nearer
+// than its radius, and is at an optimum.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -179,8 +179,8 @@ TEST_P(Sheet, AJumpOfAMeterInATickDoesNotEither) {
       const TickResult felt = touch.at(to);
       ASSERT_GE(side * felt.proxy_m.z, 2e-3 * (1.0 - 1e-9)) << n;
       for (int wait = 0; wait < 3; ++wait) touch.at(to);
-      // With the device behind the sheet, the proxy is straight in front of it on the sheet, wherever the
-      // device jumped to.
+      // If the device is behind the sheet, the proxy is on the sheet, straight in front of the device. This
+      // holds wherever the device jumped to.
       const dvec3 on_sheet(to.x, to.y, n % 2 == 0 ? 2e-3 * side : z);
       EXPECT_LE(glm::length(touch.state().proxy_m - on_sheet), 1e-6) << n;
     }
@@ -340,7 +340,7 @@ TEST_F(RigidSweep, FirstOrderConditionsHoldAgainstEveryTriangleAllAlongASlide) {
     worst = std::max(worst, unbalanced(felt.proxy_m - felt.device_m, normals));
   }
   EXPECT_LE(worst, 1e-6);         // the proxy is within a micrometer of its minimum
-  EXPECT_GE(nearest, r - 1e-11);  // and never nearer to a triangle than r
+  EXPECT_GE(nearest, r - 1e-11);  // the proxy is never nearer to a triangle than r
   EXPECT_EQ(touch.state().truncated_ticks, 0U);
   RecordProperty("worst_m", std::to_string(worst));
   std::printf(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The work of a sweep is bounded on any mesh and at any speed. A sweep that the bound ends leaves the proxy
-// outside everything, and later sweeps take it to the same place.
+// outside all objects, and later sweeps take it to its optimum.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,9 +21,9 @@ namespace {
 using glm::dvec3;
 using polygon::Neighbourhood;
 
-constexpr double kBall_m = 0.05;  // of triangles, at the scene's origin
-// What the last step may add: a survey that was too large, the next one, and each of its planes renewed
-// twice.
+constexpr double kBall_m = 0.05;  // radius; the ball lies at the scene's origin
+// Largest work of a sweep's last step: a survey that was too large, a second survey, and two renewals of each
+// plane of the second.
 constexpr std::uint32_t kLastStep = 6 * Neighbourhood::kCapacity;
 
 // A ball of 20 * 4^level triangles and a tool, without a map.
@@ -78,7 +78,7 @@ class SweepWork : public ::testing::TestWithParam<std::tuple<int, double>> {
     ASSERT_GE(ball_.clearance(), -1e-9 * kBall_m);
     cut_ += sweep.arrived ? 0 : 1;
   }
-  // Held still, the proxy arrives where the ball nearest to the goal would be, up to the facets.
+  // With the goal held still, the proxy must arrive at the nearest place of an ideal ball, up to the facets.
   void arrives(const dvec3& goal) {
     hybrid::Sweep sweep;
     for (int tick = 0; tick < 200 && (tick == 0 || !sweep.arrived); ++tick) sweep = ball_.sweep(goal);
@@ -90,8 +90,8 @@ class SweepWork : public ::testing::TestWithParam<std::tuple<int, double>> {
   int cut_ = 0;
 };
 
-// The goal passes the middle at 0.3 mm, where the nearest place goes half round the ball within a tick or
-// two.
+// The goal passes the ball's centre at a distance of 0.3 mm. The nearest place then goes half round the ball
+// within a tick or two.
 TEST_P(SweepWork, IsBoundedWhenTheGoalPassesTheMiddle) {
   const dvec3 along = glm::normalize(dvec3(1.0, 0.3, -0.2)),
               aside = 3e-4 * glm::normalize(dvec3(0.2, 0.0, 1.0));
@@ -116,7 +116,7 @@ TEST_P(SweepWork, IsBoundedInTapsAtTwoMetersASecond) {
 }
 
 // Free space between two taps lets the range of a search grow. The landing must not list every element within
-// it.
+// this range.
 TEST_P(SweepWork, LandsWithFewElements) {
   std::uint32_t most = 0;
   for (int tap = 0; tap < 40; ++tap) {
@@ -128,7 +128,7 @@ TEST_P(SweepWork, LandsWithFewElements) {
     }
     ASSERT_GT(ball_.state().active_count, 0U);
   }
-  // In units of elements listed. A ball of 2 mm touches many triangles of the finest mesh at once.
+  // The unit of work is a listed element. A ball of 2 mm touches many triangles of the finest mesh at once.
   EXPECT_LE(most, (std::get<1>(GetParam()) > 0.0 ? 2 : 1) * Neighbourhood::kCapacity);
 }
 

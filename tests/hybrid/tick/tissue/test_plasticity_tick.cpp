@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene with plastic tissue: a deep press leaves a dent, which is equal in each run and can be felt.
+// A scene with plastic tissue. A deep press leaves a dent, which is equal in each run and can be felt.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,7 +55,7 @@ TEST_F(YieldTick, ABlockKeepsItsDentAndTheToolFeelsIt) {
   EXPECT_GT(dent, 0.2 * depth);
   EXPECT_LT(dent, depth);
   EXPECT_LT(deepest_m(spring), 0.01 * depth) << "what does not yield has none";
-  // The tissue of the dent is gone: a tool in the upper half of the dent touches nothing.
+  // The dent is empty, so a tool in its upper half touches nothing.
   const dvec3 in_the_dent(0.0, 0.0, kTouchedAt - 0.5 * dent);
   EXPECT_EQ(coupling(dough.go(in_the_dent, 4e-5, 100)), dvec3(0.0));
   EXPECT_GT(coupling(spring.go(in_the_dent, 4e-5, 100)).z, 0.0);

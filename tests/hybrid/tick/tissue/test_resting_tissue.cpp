@@ -45,8 +45,8 @@ TEST(RestingTissue, ABrainStaysOutsideItsSkullAndComesToRest) {
   std::cout << "overlap with the skull at most " << -100.0 * deepest / cell << " % of a cell\n";
   EXPECT_GT(deepest, -0.05 * cell);
 
-  // The tool is away from 3.4 s on. The brain then rises off the skull, and must not oscillate: its gap to
-  // the skull may only grow.
+  // The tool is away from 3.4 s on. The brain then rises off the skull. Its gap to the skull may only grow,
+  // because it must not oscillate.
   double falls = 0.0, highest = *gap_from(3.6);
   for (auto gap = gap_from(3.6); gap != course.gap_m.end(); ++gap) {
     highest = std::max(highest, *gap);

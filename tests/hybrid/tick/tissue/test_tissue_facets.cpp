@@ -29,7 +29,7 @@ std::string gel(double radius_mm, double thickness_mm, const Limits& limits) {
 
 class TissueFacets : public tests::SceneFile {};
 
-// The surface of a block at rest is known: it is the box of its voxel centres, grown by half a spacing.
+// The surface of a block at rest is the box of its voxel centres, grown by half a spacing.
 TEST_F(TissueFacets, OfABlockAtRestAreItsFaces) {
   tests::Touch touch(load(gel(2.0, 20.0, {0.5, 1.5, 0.5})), {0.0, 0.0, 0.013});
   touch.at({0.0, 0.0, 0.01205});  // near enough to list voxels, without touching any
@@ -52,7 +52,7 @@ TEST_F(TissueFacets, OfABlockAtRestAreItsFaces) {
   }
   tool.centre = {x, y, top + 0.5 * kSpacing_m + 1.6e-3};  // too far
   EXPECT_EQ(hybrid::facet_bounds(block, tool, 1.5e-3, bounds), 0U);
-  // Just outside an edge of the top, the facets are those of the side, so the tool can slide down along it.
+  // Just outside an edge of the top, the facets are those of the side, so the tool can slide down the side.
   tests::Touch beside(load(gel(2.0, 20.0, {0.5, 1.5, 0.5})), {0.0235, 0.0, 0.0095});
   beside.at({0.02205, 0.0, 0.0095});
   const double side = block.lattice().rest(block.lattice().at(dims[0] - 1, 0, 0)).x;
