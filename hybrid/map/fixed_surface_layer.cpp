@@ -12,50 +12,67 @@ namespace {
 
 constexpr int kEdge = BrickGrid::kEdge;
 
-// A convex polygon: a triangle that up to four planes have cut.
+// A convex polygon: a triangle that up to two planes have cut.
 struct Polygon {
-  std::array<glm::dvec3, 7> corner;
+  std::array<glm::dvec3, 5> corner;
   std::size_t count = 0;
+
+  [[nodiscard]] const glm::dvec3& after(std::size_t i) const { return corner[i + 1 == count ? 0 : i + 1]; }
 };
 
-// The part of the polygon on one side of a plane (Sutherland & Hodgman 1974): sign · coordinate ≤ sign · at.
+// The part of the polygon on one side of a plane across z (Sutherland & Hodgman 1974): sign · z ≤ sign · at.
 // Rounding acts as if the plane were displaced by some units in the last place of its coordinates.
-void cut(Polygon& polygon, int axis, double sign, double at) {
-  const auto beyond = [&](const glm::dvec3& p) { return sign * (p[axis] - at); };
-  const auto end = polygon.corner.begin() + static_cast<std::ptrdiff_t>(polygon.count);
-  if (std::none_of(polygon.corner.begin(), end, [&](const glm::dvec3& p) { return beyond(p) > 0.0; })) return;
+Polygon cut(const Polygon& polygon, double sign, double at) {
   Polygon kept;
   for (std::size_t i = 0; i < polygon.count; ++i) {
-    const glm::dvec3 &p = polygon.corner[i], &q = polygon.corner[i + 1 == polygon.count ? 0 : i + 1];
-    const double from = beyond(p), to = beyond(q);
+    const glm::dvec3 &p = polygon.corner[i], &q = polygon.after(i);
+    const double from = sign * (p.z - at), to = sign * (q.z - at);
     if (from <= 0.0) kept.corner[kept.count++] = p;
     if ((from <= 0.0) != (to <= 0.0)) kept.corner[kept.count++] = p + from / (from - to) * (q - p);
   }
-  polygon = kept;
+  return kept;
 }
 
-// The part of the polygon with low ≤ coordinate ≤ high.
-Polygon between(const Polygon& polygon, int axis, double low, double high) {
-  Polygon part = polygon;
-  cut(part, axis, -1.0, low);
-  if (part.count > 0) cut(part, axis, 1.0, high);
-  return part;
-}
+struct Extent {
+  double least = 1e300, most = -1e300;
 
-// The cells that the polygon's extent along an axis touches, among those between low and high.
-std::pair<std::int32_t, std::int32_t> extent(const Polygon& polygon, int axis, double slack,
-                                             const CellCoordinates& low, const CellCoordinates& high) {
-  double least = polygon.corner[0][axis], most = least;
-  for (std::size_t i = 1; i < polygon.count; ++i) {
-    least = std::min(least, polygon.corner[i][axis]);
-    most = std::max(most, polygon.corner[i][axis]);
+  void add(double x) {
+    least = std::min(least, x);
+    most = std::max(most, x);
   }
-  const auto d = static_cast<std::size_t>(axis);
-  const auto cell = [&](double at) {
-    return static_cast<std::int32_t>(
-        std::clamp(std::floor(at), static_cast<double>(low[d]), static_cast<double>(high[d])));
-  };
-  return {cell(least - slack), cell(most + slack)};
+  [[nodiscard]] bool empty() const { return least > most; }
+  // The cells that it touches with `slack`, among those from `low` to `high`.
+  [[nodiscard]] std::pair<std::int32_t, std::int32_t> cells(double slack, std::int32_t low,
+                                                            std::int32_t high) const {
+    const auto cell = [low, high](double at) {
+      const double inside = std::clamp(at, static_cast<double>(low), static_cast<double>(high));
+      const auto towards_zero = static_cast<std::int32_t>(inside);
+      return towards_zero - (static_cast<double>(towards_zero) > inside ? 1 : 0);
+    };
+    return {cell(least - slack), cell(most + slack)};
+  }
+};
+
+Extent extent_along_y(const Polygon& polygon) {
+  Extent extent;
+  for (std::size_t i = 0; i < polygon.count; ++i) extent.add(polygon.corner[i].y);
+  return extent;
+}
+
+// Extent along x of the part of the polygon with low ≤ y ≤ high. The corners of that part lie on the edges.
+Extent extent_along_x(const Polygon& polygon, double low, double high) {
+  Extent extent;
+  for (std::size_t i = 0; i < polygon.count; ++i) {
+    const glm::dvec3 &p = polygon.corner[i], &q = polygon.after(i);
+    if (std::max(p.y, q.y) < low || std::min(p.y, q.y) > high) continue;
+    const auto within = [&](const glm::dvec3& end) {
+      if (end.y >= low && end.y <= high) return end.x;
+      return p.x + ((end.y < low ? low : high) - p.y) / (q.y - p.y) * (q.x - p.x);
+    };
+    extent.add(within(p));
+    extent.add(within(q));
+  }
+  return extent;
 }
 
 std::uint64_t bit_in_layer(const CellCoordinates& cell) {
@@ -76,8 +93,8 @@ SurfaceCells::Brick& SurfaceCells::brick_at(const CellCoordinates& cell) {
   return index_[last_];
 }
 
-// The triangle is cut by each layer of cells along z, and each piece by the rows of the layer along y. A
-// piece is convex, so it touches every cell between the lowest and the highest x of its corners.
+// The triangle is cut by each layer of cells along z, and each piece by the rows of the layer along y. The
+// rest is convex, so it touches every cell between its least and its greatest x.
 void SurfaceCells::add_triangle(std::uint64_t object_bit, const glm::dvec3& a, const glm::dvec3& b,
                                 const glm::dvec3& c, double margin_m) {
   const glm::dvec3 low_m = glm::min(a, glm::min(b, c)) - margin_m,
@@ -105,15 +122,15 @@ void SurfaceCells::add_triangle(std::uint64_t object_bit, const glm::dvec3& a, c
       1e-9 + 4e-15 * farthest + per_cell * (2e-15 * std::max({far.x, far.y, far.z}) + margin_m);
   CellCoordinates row = low;
   for (row[2] = low[2]; row[2] <= high[2]; ++row[2]) {
-    const Polygon layer = between(triangle, 2, row[2] - slack, row[2] + 1.0 + slack);
+    const Polygon layer = cut(cut(triangle, -1.0, row[2] - slack), 1.0, row[2] + 1.0 + slack);
     if (layer.count == 0) continue;
-    const auto [y0, y1] = extent(layer, 1, slack, low, high);
+    const auto [y0, y1] = extent_along_y(layer).cells(slack, low[1], high[1]);
     for (row[1] = y0; row[1] <= y1; ++row[1]) {
       row[0] = low[0];
       if (is_occupied(object_bit, row, high[0])) continue;
-      const Polygon piece = between(layer, 1, row[1] - slack, row[1] + 1.0 + slack);
-      if (piece.count == 0) continue;
-      const auto [x0, x1] = extent(piece, 0, slack, low, high);
+      const Extent extent = extent_along_x(layer, row[1] - slack, row[1] + 1.0 + slack);
+      if (extent.empty()) continue;
+      const auto [x0, x1] = extent.cells(slack, low[0], high[0]);
       row[0] = x0;
       occupy(object_bit, row, x1);
     }
