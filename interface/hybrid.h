@@ -185,8 +185,9 @@ typedef struct hybrid_editable {
   uint32_t size;        /* sizeof(hybrid_editable) */
   const char* object;   /* NULL: the tool */
   const char* quantity; /* "stiffness" (N/m) and "max-force" (N) of the tool; of rigid objects
-                         * "static-friction", "dynamic-friction", "damping" (N s/m), "texture-height" (m);
-                         * of soft ones "tissue-factor", a factor on Young's modulus */
+                         * "static-friction", "dynamic-friction", "damping" (N s/m), "texture-height" (m),
+                         * and "stiffness" if the scene gives the object one; of soft ones "tissue-factor", a
+                         * factor on Young's modulus */
   double in_scene;      /* value of the scene, SI */
   double low, high;     /* allowed values, SI */
 } hybrid_editable;

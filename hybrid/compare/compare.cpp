@@ -100,6 +100,13 @@ ModelResult closed_model(const ClosedForm& form, const Tool& tool, const std::ve
   return model;
 }
 
+// The tool as it feels the object.
+Tool tool_on(const RigidDescription& rigid, const Tool& tool) {
+  Tool felt = tool;
+  if (rigid.feel.stiffness_N_per_m > 0.0) felt.stiffness_N_per_m = rigid.feel.stiffness_N_per_m;
+  return felt;
+}
+
 // Renders the object by the nearest surface, without a proxy. The surface is that of the model with a proxy.
 ModelResult classic_model(const RigidDescription& rigid, const Tool& tool, const std::vector<TraceRow>& like,
                           const std::vector<Pose>& poses) {
@@ -213,6 +220,7 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
                     "and there is no one motion to compare; fix it or give it a path",
                     rigid->name));
   }
+  const Tool tool = is_soft ? scene.tool : tool_on(*rigid, scene.tool);
   const bool punch = scene.tool.shape == Tool::Shape::punch;
   std::optional<ClosedForm> form = is_soft ? closed_form_of(scene, *soft) : closed_form_of(*rigid);
   if (!punch) {  // a punch does not feel rigid objects
@@ -223,7 +231,7 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
     if (!is_soft) {
       const auto& rows = result.models.front().rows;
       result.models.push_back(
-          classic_model(as_proxy.rigid.back(), scene.tool, rows, poses_along(*rigid, scene, rows.size())));
+          classic_model(as_proxy.rigid.back(), tool, rows, poses_along(*rigid, scene, rows.size())));
     }
   }
   std::optional<SoftDescription> voxels = is_soft ? *soft : as_soft(*rigid);
@@ -252,7 +260,7 @@ Comparison compare_models(const Scene& scene, const std::string& object, const P
   std::vector<Pose> poses;
   if (form) poses = is_soft ? std::vector<Pose>(ticks, form->pose) : poses_along(*rigid, scene, ticks);
   if (form && !holds_along(*form, scene.tool, result.models.front().rows, poses)) form.reset();
-  if (form) result.models.push_back(closed_model(*form, scene.tool, result.models.front().rows, poses));
+  if (form) result.models.push_back(closed_model(*form, tool, result.models.front().rows, poses));
 
   // The reference is the closed form where it is exact or nearly so. Otherwise it is the model with which the
   // scene itself renders the object.

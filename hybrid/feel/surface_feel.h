@@ -20,7 +20,8 @@ struct SurfaceFeel {  // the feel of one rigid object
   double static_friction = 0.0, dynamic_friction = 0.0;  // 0 <= dynamic <= static
   bool shading = false;
   std::shared_ptr<const HeightTexture> texture{};
-  double texture_share = 1.0;  // factor on the texture's height
+  double texture_share = 1.0;      // factor on the texture's height
+  double stiffness_N_per_m = 0.0;  // of the coupling in contact with this object; 0: the tool's
 
   [[nodiscard]] bool has_friction() const noexcept { return static_friction > 0.0; }
   [[nodiscard]] bool any() const noexcept {

@@ -11,29 +11,68 @@ namespace hybrid {
 namespace {
 
 constexpr int kEdge = BrickGrid::kEdge;
-// Longer triangles are halved until each spans few cells, because the box of an oblique triangle is mostly
-// empty.
-constexpr double kLongestPiece = 8.0;  // cells
 
-// Does the triangle touch the box? Separating axes (Akenine-Möller 2001): three box axes, the triangle's
-// normal, and nine cross products of edges.
-bool triangle_touches_box(const std::array<glm::dvec3, 3>& t, const glm::dvec3& centre, double half) {
-  const std::array<glm::dvec3, 3> v{t[0] - centre, t[1] - centre, t[2] - centre};
-  const auto separates = [&v, half](const glm::dvec3& axis) {
-    const double p0 = glm::dot(v[0], axis), p1 = glm::dot(v[1], axis), p2 = glm::dot(v[2], axis);
-    const double r = half * (std::fabs(axis.x) + std::fabs(axis.y) + std::fabs(axis.z));
-    return std::min({p0, p1, p2}) > r || std::max({p0, p1, p2}) < -r;
-  };
-  const std::array<glm::dvec3, 3> e{v[1] - v[0], v[2] - v[1], v[0] - v[2]};
-  for (int d = 0; d < 3; ++d) {
-    glm::dvec3 axis(0.0);
-    axis[d] = 1.0;
-    if (separates(axis)) return false;
-    for (const glm::dvec3& edge : e) {
-      if (separates(glm::cross(axis, edge))) return false;
-    }
+// A convex polygon: a triangle that up to two planes have cut.
+struct Polygon {
+  std::array<glm::dvec3, 5> corner;
+  std::size_t count = 0;
+
+  [[nodiscard]] const glm::dvec3& after(std::size_t i) const { return corner[i + 1 == count ? 0 : i + 1]; }
+};
+
+// The part of the polygon on one side of a plane across z (Sutherland & Hodgman 1974): sign · z ≤ sign · at.
+// Rounding acts as if the plane were displaced by some units in the last place of its coordinates.
+Polygon cut(const Polygon& polygon, double sign, double at) {
+  Polygon kept;
+  for (std::size_t i = 0; i < polygon.count; ++i) {
+    const glm::dvec3 &p = polygon.corner[i], &q = polygon.after(i);
+    const double from = sign * (p.z - at), to = sign * (q.z - at);
+    if (from <= 0.0) kept.corner[kept.count++] = p;
+    if ((from <= 0.0) != (to <= 0.0)) kept.corner[kept.count++] = p + from / (from - to) * (q - p);
   }
-  return !separates(glm::cross(e[0], e[1]));
+  return kept;
+}
+
+struct Extent {
+  double least = 1e300, most = -1e300;
+
+  void add(double x) {
+    least = std::min(least, x);
+    most = std::max(most, x);
+  }
+  [[nodiscard]] bool empty() const { return least > most; }
+  // The cells that it touches with `slack`, among those from `low` to `high`.
+  [[nodiscard]] std::pair<std::int32_t, std::int32_t> cells(double slack, std::int32_t low,
+                                                            std::int32_t high) const {
+    const auto cell = [low, high](double at) {
+      const double inside = std::clamp(at, static_cast<double>(low), static_cast<double>(high));
+      const auto towards_zero = static_cast<std::int32_t>(inside);
+      return towards_zero - (static_cast<double>(towards_zero) > inside ? 1 : 0);
+    };
+    return {cell(least - slack), cell(most + slack)};
+  }
+};
+
+Extent extent_along_y(const Polygon& polygon) {
+  Extent extent;
+  for (std::size_t i = 0; i < polygon.count; ++i) extent.add(polygon.corner[i].y);
+  return extent;
+}
+
+// Extent along x of the part of the polygon with low ≤ y ≤ high. The corners of that part lie on the edges.
+Extent extent_along_x(const Polygon& polygon, double low, double high) {
+  Extent extent;
+  for (std::size_t i = 0; i < polygon.count; ++i) {
+    const glm::dvec3 &p = polygon.corner[i], &q = polygon.after(i);
+    if (std::max(p.y, q.y) < low || std::min(p.y, q.y) > high) continue;
+    const auto within = [&](const glm::dvec3& end) {
+      if (end.y >= low && end.y <= high) return end.x;
+      return p.x + ((end.y < low ? low : high) - p.y) / (q.y - p.y) * (q.x - p.x);
+    };
+    extent.add(within(p));
+    extent.add(within(q));
+  }
+  return extent;
 }
 
 std::uint64_t bit_in_layer(const CellCoordinates& cell) {
@@ -49,70 +88,76 @@ std::size_t layer_of(const CellCoordinates& cell) {
 
 SurfaceCells::Brick& SurfaceCells::brick_at(const CellCoordinates& cell) {
   const CellCoordinates at = BrickGrid::brick_of(cell);
-  if (last_ == kNone || index_[last_].at != at)
+  if (last_ == kNone || !same(index_[last_].at, at))
     last_ = index_.find_or_add(at, true, [](const Brick&, std::uint32_t) {});
   return index_[last_];
 }
 
+// The triangle is cut by each layer of cells along z, and each piece by the rows of the layer along y. The
+// rest is convex, so it touches every cell between its least and its greatest x.
 void SurfaceCells::add_triangle(std::uint64_t object_bit, const glm::dvec3& a, const glm::dvec3& b,
                                 const glm::dvec3& c, double margin_m) {
-  low_ = glm::min(low_, glm::min(a, glm::min(b, c)) - margin_m);
-  high_ = glm::max(high_, glm::max(a, glm::max(b, c)) + margin_m);
-  const double ab = glm::length(b - a), bc = glm::length(c - b), ca = glm::length(a - c);
-  const double longest = std::max({ab, bc, ca});
-  if (longest <= kLongestPiece * cell_m()) {
-    add_piece(object_bit, {a, b, c}, margin_m);
-  } else if (longest == ab) {
-    const glm::dvec3 m = 0.5 * (a + b);
-    add_triangle(object_bit, a, m, c, margin_m);
-    add_triangle(object_bit, m, b, c, margin_m);
-  } else if (longest == bc) {
-    add_triangle(object_bit, b, c, a, margin_m);
-  } else {
-    add_triangle(object_bit, c, a, b, margin_m);
+  const glm::dvec3 low_m = glm::min(a, glm::min(b, c)) - margin_m,
+                   high_m = glm::max(a, glm::max(b, c)) + margin_m;
+  low_ = glm::min(low_, low_m);
+  high_ = glm::max(high_, high_m);
+  const auto [low, high] = index_.cells_of(low_m, high_m);
+  // All cells of one row, because the triangle is connected.
+  if (low[1] == high[1] && low[2] == high[2]) {
+    occupy(object_bit, low, high[0]);
+    return;
   }
-}
-
-void SurfaceCells::add_piece(std::uint64_t object_bit, const std::array<glm::dvec3, 3>& t, double margin_m) {
-  const auto [a, b] = index_.cells_of(glm::min(t[0], glm::min(t[1], t[2])) - margin_m,
-                                      glm::max(t[0], glm::max(t[1], t[2])) + margin_m);
-  // A triangle whose box spans one cell or a row of cells touches all of them, because it is connected.
-  // Others need the exact test.
-  int axes = 0;
-  double farthest = 1.0;
-  for (std::size_t d = 0; d < 3; ++d) {
-    axes += a[d] != b[d] ? 1 : 0;
-    farthest = std::max({farthest, std::fabs(a[d]), std::fabs(b[d])});
-  }
-  const bool ask = axes > 1;
-  // Vertices relative to the map's origin, as cells are. The box is slightly larger than the cell, so that a
+  // Corners in cells from the map's origin, as cells are counted. Cells are slightly larger here, so that a
   // triangle in the face between two cells is in both despite rounding.
-  const std::array<glm::dvec3, 3> local{t[0] - index_.origin(), t[1] - index_.origin(),
-                                        t[2] - index_.origin()};
-  const glm::dvec3 far = glm::abs(t[0]);
-  const double half =
-      0.5 * cell_m() * (1.0 + 1e-9 + 4e-15 * farthest) + 1e-15 * std::max({far.x, far.y, far.z}) + margin_m;
-  CellCoordinates c{};
-  for (c[2] = a[2]; c[2] <= b[2]; ++c[2]) {
-    for (c[1] = a[1]; c[1] <= b[1]; ++c[1]) {
-      for (c[0] = a[0]; c[0] <= b[0]; ++c[0]) {
-        // A fine mesh has many triangles in a cell: the exact test is made only until the cell is occupied.
-        if (ask && !is_occupied_in_last_brick(c, object_bit) &&
-            !triangle_touches_box(local, cell_m() * (glm::dvec3(c[0], c[1], c[2]) + 0.5), half))
-          continue;
-        Brick& brick = brick_at(c);
-        brick.layer[layer_of(c)] |= bit_in_layer(c);
-        brick.objects |= object_bit;
-      }
+  const double per_cell = 1.0 / cell_m();
+  Polygon triangle{
+      {per_cell * (a - index_.origin()), per_cell * (b - index_.origin()), per_cell * (c - index_.origin())},
+      3};
+  double farthest = 1.0;
+  for (std::size_t d = 0; d < 3; ++d)
+    farthest =
+        std::max({farthest, std::fabs(static_cast<double>(low[d])), std::fabs(static_cast<double>(high[d]))});
+  const glm::dvec3 far = glm::max(glm::abs(low_m), glm::abs(high_m));
+  const double slack =
+      1e-9 + 4e-15 * farthest + per_cell * (2e-15 * std::max({far.x, far.y, far.z}) + margin_m);
+  CellCoordinates row = low;
+  for (row[2] = low[2]; row[2] <= high[2]; ++row[2]) {
+    const Polygon layer = cut(cut(triangle, -1.0, row[2] - slack), 1.0, row[2] + 1.0 + slack);
+    if (layer.count == 0) continue;
+    const auto [y0, y1] = extent_along_y(layer).cells(slack, low[1], high[1]);
+    for (row[1] = y0; row[1] <= y1; ++row[1]) {
+      row[0] = low[0];
+      if (is_occupied(object_bit, row, high[0])) continue;
+      const Extent extent = extent_along_x(layer, row[1] - slack, row[1] + 1.0 + slack);
+      if (extent.empty()) continue;
+      const auto [x0, x1] = extent.cells(slack, low[0], high[0]);
+      row[0] = x0;
+      occupy(object_bit, row, x1);
     }
   }
 }
 
-bool SurfaceCells::is_occupied_in_last_brick(const CellCoordinates& cell,
-                                             std::uint64_t object_bit) const noexcept {
-  if (last_ == kNone || index_[last_].at != BrickGrid::brick_of(cell)) return false;
+// Occupies the cells from `first` along x up to `last_x`.
+void SurfaceCells::occupy(std::uint64_t object_bit, const CellCoordinates& first, std::int32_t last_x) {
+  CellCoordinates c = first;
+  while (c[0] <= last_x) {
+    const std::int32_t end = std::min(last_x, c[0] | (kEdge - 1));
+    Brick& brick = brick_at(c);
+    brick.layer[layer_of(c)] |= BrickGrid::layer_mask({c, {end, c[1], c[2]}});
+    brick.objects |= object_bit;
+    c[0] = end + 1;
+  }
+}
+
+// Are the cells from `first` along x up to `last_x` already occupied? Looks in the brick of the last
+// insertion only. A fine mesh has many triangles in a cell, and most lie in that brick.
+bool SurfaceCells::is_occupied(std::uint64_t object_bit, const CellCoordinates& first,
+                               std::int32_t last_x) const noexcept {
+  if (last_ == kNone || (first[0] | (kEdge - 1)) < last_x) return false;
   const Brick& brick = index_[last_];
-  return (brick.objects & object_bit) != 0 && (brick.layer[layer_of(cell)] & bit_in_layer(cell)) != 0;
+  if ((brick.objects & object_bit) == 0 || !same(brick.at, BrickGrid::brick_of(first))) return false;
+  const std::uint64_t cells = BrickGrid::layer_mask({first, {last_x, first[1], first[2]}});
+  return (brick.layer[layer_of(first)] & cells) == cells;
 }
 
 void SurfaceCells::seal() {

@@ -54,11 +54,10 @@ class SurfaceCells {
     return !(low.x > high_.x || high.x < low_.x || low.y > high_.y || high.y < low_.y || low.z > high_.z ||
              high.z < low_.z);
   }
-  void add_piece(std::uint64_t object_bit, const std::array<glm::dvec3, 3>& t, double margin_m);
+  void occupy(std::uint64_t object_bit, const CellCoordinates& first, std::int32_t last_x);
+  [[nodiscard]] bool is_occupied(std::uint64_t object_bit, const CellCoordinates& first,
+                                 std::int32_t last_x) const noexcept;
   Brick& brick_at(const CellCoordinates& cell);
-  // Is the cell already occupied, in the brick of the last insertion?
-  [[nodiscard]] bool is_occupied_in_last_brick(const CellCoordinates& cell,
-                                               std::uint64_t object_bit) const noexcept;
 
   BrickIndex<Brick> index_;
   std::uint32_t last_ = kNone;  // brick of the last insertion; mostly also that of the next

@@ -272,6 +272,13 @@ class ModelsRun {
     return variants;
   }
 
+  // Stiffness of the coupling in contact with the object as a proxy feels it.
+  [[nodiscard]] double stiffness_on(const std::string& name) const {
+    const auto rigid = std::ranges::find(scene_.rigid, name, &RigidDescription::name);
+    const double own = rigid != scene_.rigid.end() ? rigid->feel.stiffness_N_per_m : 0.0;
+    return own > 0.0 ? own : result_.stiffness_N_per_m;
+  }
+
   void find_depth(ObjectModels& object) const {
     const auto proxy = std::ranges::find(object.rows, kProxyVariant, &ModelRow::name);
     const ModelRow& rigid =
@@ -279,7 +286,7 @@ class ModelsRun {
     const auto index = soft_index(object.object);
     object.depth_from_proxy = &rigid != object.rows.data() || !index || objects_[*index].own.proxy;
     if (object.depth_from_proxy) {
-      object.depth_m = depths_of(rigid.course, result_.stiffness_N_per_m);
+      object.depth_m = depths_of(rigid.course, stiffness_on(object.object));
       if (object.contact && !object.rigid) {
         object.match = match_stiffness(object.reference, rigid.course, result_.stiffness_N_per_m,
                                        *object.contact, result_.dt_s);

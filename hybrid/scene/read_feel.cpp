@@ -8,7 +8,7 @@
 namespace hybrid {
 namespace {
 
-constexpr std::string_view keys_of_feel[] = {"damping", "friction", "shading", "texture"};
+constexpr std::string_view keys_of_feel[] = {"stiffness", "damping", "friction", "shading", "texture"};
 
 // Reads `friction`: one number for both coefficients, [static, dynamic], or { static = , dynamic = }.
 void read_friction(const TableReader& table, FeelDescription& out) {
@@ -83,6 +83,9 @@ std::span<const std::string_view> feel_keys() {
 
 FeelDescription read_feel(const TableReader& table) {
   FeelDescription out;
+  const Quantity stiffness{"a stiffness above 0 in N/m", "1000", 1.0, kCouplingRange_N_per_m.low,
+                           kCouplingRange_N_per_m.high};
+  out.stiffness_N_per_m = table.number("stiffness", stiffness, out.stiffness_N_per_m);
   const Quantity damping{"a damping of 0 or more in N s/m", "2", 1.0, kDampingRange_N_s_per_m.low,
                          kDampingRange_N_s_per_m.high};
   out.damping_N_s_per_m = table.number("damping", damping, out.damping_N_s_per_m);
@@ -97,7 +100,8 @@ SurfaceFeel build_feel(const FeelDescription& description) {
                    .static_friction = description.static_friction,
                    .dynamic_friction = description.dynamic_friction,
                    .shading = description.shading,
-                   .texture = nullptr};
+                   .texture = nullptr,
+                   .stiffness_N_per_m = description.stiffness_N_per_m};
   if (!description.texture) return feel;
   const TextureDescription& texture = *description.texture;
   feel.texture = texture.image.empty()

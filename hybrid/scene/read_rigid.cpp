@@ -21,7 +21,6 @@ constexpr std::size_t longest_name = 64;
 constexpr std::size_t most_labels = 254;
 
 constexpr UnsupportedKey rigid_later[] = {
-    {"stiffness", "remove it: the stiffness of every rigid contact is [tool] stiffness for now"},
     {"model", "remove it; what may be felt either way is a [[soft]] object with model = \"auto\""},
 };
 

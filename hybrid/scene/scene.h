@@ -127,6 +127,7 @@ struct TextureDescription {
   SourcePlace place;  // of the key that names the image
 };
 struct FeelDescription {
+  double stiffness_N_per_m = 0.0;                        // of the coupling; 0: the tool's
   double damping_N_s_per_m = 0.0;                        // along the normal
   double static_friction = 0.0, dynamic_friction = 0.0;  // Coulomb; 0 <= dynamic <= static
   bool shading = false;

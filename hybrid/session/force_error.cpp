@@ -166,7 +166,7 @@ ForceError compare_with_slow_run(const World& world, WorldState& state, const Fo
     }
     if (options.wide_patches) widen(state, wide);
     from = tick.device_m;
-    const glm::dvec3 reference = world.tool.stiffness_N_per_m * (felt.proxy_m - felt.device_m);
+    const glm::dvec3 reference = felt.coupling_N;
     if (stops_at_rest && still[t] > 0) rest.see(reference);
     if (!tick.soft) continue;
     ++seen;

@@ -33,7 +33,8 @@ std::string write_value(SceneTextEditor& editor, std::span<const ValueInScene> v
   const TextTable object{"rigid", value.object};
   switch (value.quantity) {
     case EditedQuantity::coupling_stiffness:
-      return editor.set({"tool"}, "stiffness", saved_number(value.value));
+      return editor.set(value.object.empty() ? TextTable{"tool"} : object, "stiffness",
+                        saved_number(value.value));
     case EditedQuantity::max_force:
       return editor.set({"safety"}, "max_force", saved_number(value.value));
     case EditedQuantity::damping:

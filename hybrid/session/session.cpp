@@ -248,8 +248,8 @@ class Run {
     }
     if (!options_.keep_rows) return;
     result_.rows.push_back({static_cast<double>(tick) * dt_, felt.device_m, felt.proxy_m, felt.force_N,
-                            glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts,
-                            felt.tick_us});
+                            glm::length(felt.rigid_N), glm::length(felt.soft_N), felt.contacts, felt.tick_us,
+                            felt.coupling_N});
   }
 
   void keep_in_course(const TickResult& felt) {

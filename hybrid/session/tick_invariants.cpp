@@ -22,18 +22,22 @@ double length(const glm::dvec3& v) {
   return std::hypot(v.x, v.y, v.z);
 }
 
+// Slope of the coupling's force over depth.
+double slope_N_per_m(const World& world, const WorldState& state) {
+  return state.mixed.pressed() ? state.mixed.stiffness_N_per_m : world.tool.stiffness_N_per_m;
+}
+
 // Energy and force of the clamped coupling. The energy is ½K d² up to the clamp. Beyond it the work of the
-// constant force is added.
+// constant force is added. Energy that a mixed coupling has to spare counts as stored.
 struct Spring {
   glm::dvec3 clamped_N{0.0};
   double stored_J = 0.0;
 };
-Spring spring_of(const World& world, const glm::dvec3& proxy_m, const glm::dvec3& device_m) {
-  const double k = world.tool.stiffness_N_per_m, most = world.limits.max_force_N;
-  const glm::dvec3 force = k * (proxy_m - device_m);
-  const double pull = length(force);
-  if (pull <= most) return {force, 0.5 * pull * pull / k};
-  return {force * (most / pull), most * (pull - 0.5 * most) / k};
+Spring spring_of(const World& world, const WorldState& state, const glm::dvec3& force) {
+  const double k = slope_N_per_m(world, state), most = world.limits.max_force_N;
+  const double pull = length(force), spare_J = std::max(0.0, state.mixed.energy_J - 0.5 * pull * pull / k);
+  if (pull <= most) return {force, 0.5 * pull * pull / k + spare_J};
+  return {force * (most / pull), most * (pull - 0.5 * most) / k + spare_J};
 }
 
 bool finite(const WorldState& state) {
@@ -63,7 +67,7 @@ bool finite(const WorldState& state) {
 
 TickInvariants::TickInvariants(const World& world, const WorldState& state)
     : world_(world), hash_(kHashBegin), force_N_(state.limit.last_N), device_m_(state.device_m) {
-  const Spring spring = spring_of(world, state.proxy_m, state.device_m);
+  const Spring spring = spring_of(world, state, coupling_force_N(world, state, state.device_m));
   allowed_J_ = stored_J_ = spring.stored_J;  // the hand may get the energy that is already stored
   for (const auto& object : state.soft) {
     if (object->moved_ever()) allowed_J_ += object->energy_J();
@@ -80,9 +84,9 @@ void TickInvariants::check_state(const WorldState& state) {
   if (!finite(state)) ++not_finite_;
 }
 
-void TickInvariants::account_energy(const TickResult& felt) {
-  const double k = world_.tool.stiffness_N_per_m, most = world_.limits.max_force_N;
-  const Spring spring = spring_of(world_, felt.proxy_m, felt.device_m);
+void TickInvariants::account_energy(const WorldState& state, const TickResult& felt) {
+  const double k = slope_N_per_m(world_, state), most = world_.limits.max_force_N;
+  const Spring spring = spring_of(world_, state, felt.coupling_N);
   const double stored = spring.stored_J;
   const glm::dvec3 delta = felt.device_m - device_m_;
   const double moved = length(delta), work = glm::dot(force_N_, delta);
@@ -128,7 +132,7 @@ void TickInvariants::check_tick(const WorldState& state, const TickResult& felt,
   const double step = length(felt.force_N - force_N_);
   if (force > 0.0)
     over_slew_N_ = std::max(over_slew_N_, step - world_.limits.max_slew_N_per_s * dt * (1.0 + 1e-9) - 1e-12);
-  account_energy(felt);
+  account_energy(state, felt);
   check_outside(state, felt.proxy_m);
   slowest_us_ = std::max(slowest_us_, felt.tick_us);
   hash_ = hash_tick(hash_, felt);

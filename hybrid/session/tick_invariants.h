@@ -69,7 +69,7 @@ class TickInvariants {
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
  private:
-  void account_energy(const TickResult& felt);
+  void account_energy(const WorldState& state, const TickResult& felt);
   void check_outside(const WorldState& state, const glm::dvec3& proxy);
 
   const World& world_;

@@ -196,6 +196,7 @@ struct TraceRow {
   double rigid_N = 0.0, soft_N = 0.0;
   std::uint32_t contacts = 0;  // bit per object; all objects from the 32nd on share the last bit
   double tick_us = 0.0;
+  glm::dvec3 coupling_N{0.0};  // of the virtual coupling, before the limits; not in files
 };
 
 }  // namespace hybrid

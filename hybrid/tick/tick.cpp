@@ -195,6 +195,7 @@ void publish_force(const World& world, WorldState& state, const Sweep& sweep,
   const glm::dvec3 coupling = coupling_force_N(world, state, result.device_m);
   const glm::dvec3 added = added_force(world, state, result.device_m, dt_s);
   result.proxy_m = state.proxy_m;
+  result.coupling_N = coupling;
   result.rigid_N = sweep.force_N + added;
   result.soft_N = coupling - sweep.force_N;
   result.friction_N = state.friction_N;
@@ -229,6 +230,7 @@ TickResult haptic_tick(const World& world, WorldState& state, const device::Devi
 
   if (!state.soft.empty()) let_tissue_follow(world, state, before, around, dt_s, sweep, clock);
 
+  mix_stiffness(world, state, result.device_m, dt_s, sweep);
   publish_force(world, state, sweep, input, dt_s, result);
   ++state.tick;
   clock.done(Stage::force);

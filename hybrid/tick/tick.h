@@ -31,8 +31,9 @@ inline constexpr std::size_t kLastContactBit = 31;
 struct TickResult {
   glm::dvec3 device_m{0.0};  // scene frame, as used: the last valid input
   glm::dvec3 proxy_m{0.0};
-  glm::dvec3 force_N{0.0};  // on the hand, after the limits
-  // Parts of the force before the limits: rigid_N + soft_N = K (proxy − device) plus damping and texture.
+  glm::dvec3 force_N{0.0};     // on the hand, after the limits
+  glm::dvec3 coupling_N{0.0};  // of the virtual coupling on the hand, before the limits
+  // Parts of the force before the limits: rigid_N + soft_N = coupling_N plus damping and texture.
   glm::dvec3 rigid_N{0.0}, soft_N{0.0};
   // Within rigid_N: friction with shading; damping with texture.
   glm::dvec3 friction_N{0.0}, damping_N{0.0};

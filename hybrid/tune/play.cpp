@@ -39,12 +39,11 @@ std::uint32_t contact_bits(const World& world, const std::vector<std::string>& o
   return bits;
 }
 
-ForceCourse course_of(const World& world, const std::vector<TraceRow>& rows, std::uint32_t bits) {
+ForceCourse course_of(const std::vector<TraceRow>& rows, std::uint32_t bits) {
   ForceCourse course;
   course.reserve(rows.size());
   for (const TraceRow& row : rows) {
-    course.push_back({row.device_m, world.tool.stiffness_N_per_m * (row.proxy_m - row.device_m),
-                      (row.contacts & bits) != 0});
+    course.push_back({row.device_m, row.coupling_N, (row.contacts & bits) != 0});
   }
   return course;
 }
@@ -98,7 +97,7 @@ Played play_setting(const Scene& scene, const std::vector<std::string>& objects,
   const std::uint32_t bits = contact_bits(*built.world, objects);
   const SessionResult result = run_session(scene, built, session_options(scene, motion, progress));
   device::stop_if_asked();
-  Played played{.course = course_of(*built.world, result.rows, bits),
+  Played played{.course = course_of(result.rows, bits),
                 .tick_us = {},
                 .memory_bytes = size.memory_bytes,
                 .soft_voxels = size.soft_voxels,
@@ -185,9 +184,7 @@ class RestPlayer {
 
  private:
   [[nodiscard]] bool touches() const { return (felt_.contacts & bits_) != 0; }
-  [[nodiscard]] glm::dvec3 force_N() const {
-    return built_.world->tool.stiffness_N_per_m * (felt_.proxy_m - felt_.device_m);
-  }
+  [[nodiscard]] glm::dvec3 force_N() const { return felt_.coupling_N; }
   void say(std::size_t tick, std::size_t ticks) const {
     device::stop_if_asked();
     if (progress_)

@@ -18,10 +18,10 @@ std::string tick_time_text(double us) {
   return us < 1000.0 ? with_digits(us, 3) + " µs" : with_digits(1e-3 * us, 3) + " ms";
 }
 
-std::string words_of_value(EditedQuantity quantity) {
+std::string words_of_value(EditedQuantity quantity, bool of_tool) {
   switch (quantity) {
     case EditedQuantity::coupling_stiffness:
-      return "coupling";
+      return of_tool ? "coupling" : "stiffness";
     case EditedQuantity::max_force:
       return "force limit";
     case EditedQuantity::static_friction:

@@ -15,7 +15,7 @@ namespace hybrid {
 [[nodiscard]] std::string number_format(float shown);
 // For example "85.2 µs" or "1.23 ms".
 [[nodiscard]] std::string tick_time_text(double us);
-[[nodiscard]] std::string words_of_value(EditedQuantity quantity);
+[[nodiscard]] std::string words_of_value(EditedQuantity quantity, bool of_tool);
 
 // A model of tissue that may be compared with another one: the scene after these changes.
 struct ModelOption {

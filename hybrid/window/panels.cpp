@@ -318,7 +318,7 @@ void Panels::draw_slider(const Pen& pen, std::size_t index, const EditableValue&
                          PanelResult& result) {
   const double unit = si_of_unit(value.quantity);
   const std::string unit_words(unit_of(value.quantity));
-  controls::label_beside(pen, words_of_value(value.quantity));
+  controls::label_beside(pen, words_of_value(value.quantity, value.object == Edit::kTool));
   float shown = moved_ == index ? moved_to_ : static_cast<float>(now / unit);
   const std::string format = number_format(shown) + (unit_words.empty() ? "" : " " + unit_words);
   const int flags = ImGuiSliderFlags_AlwaysClamp | (value.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);

@@ -52,6 +52,9 @@ std::optional<AllowedRange> range_of_tool(const World& world, EditedQuantity qua
 
 std::optional<AllowedRange> range_of_rigid(const RigidObject& object, EditedQuantity quantity) noexcept {
   switch (quantity) {
+    case EditedQuantity::coupling_stiffness:
+      if (object.feel.stiffness_N_per_m == 0.0) return {};
+      return kCouplingRange_N_per_m;
     case EditedQuantity::static_friction:
     case EditedQuantity::dynamic_friction:
       return kFrictionRange;
@@ -67,6 +70,9 @@ std::optional<AllowedRange> range_of_rigid(const RigidObject& object, EditedQuan
 
 void set_feel(SurfaceFeel& feel, EditedQuantity quantity, double value) noexcept {
   switch (quantity) {
+    case EditedQuantity::coupling_stiffness:
+      feel.stiffness_N_per_m = value;
+      break;
     case EditedQuantity::static_friction:
       feel.static_friction = value;
       feel.dynamic_friction = std::min(feel.dynamic_friction, value);
@@ -88,6 +94,8 @@ void set_feel(SurfaceFeel& feel, EditedQuantity quantity, double value) noexcept
 
 double value_in_feel(const SurfaceFeel& feel, EditedQuantity quantity) noexcept {
   switch (quantity) {
+    case EditedQuantity::coupling_stiffness:
+      return feel.stiffness_N_per_m;
     case EditedQuantity::static_friction:
       return feel.static_friction;
     case EditedQuantity::dynamic_friction:
@@ -126,7 +134,7 @@ std::optional<AllowedRange> edit_range(const World& world, const WorldState& sta
 double edited_value(const World& world, const WorldState& state, std::uint32_t object,
                     EditedQuantity quantity) noexcept {
   if (object == Edit::kTool) {
-    return quantity == EditedQuantity::coupling_stiffness ? coupling_N_per_m(world, state)
+    return quantity == EditedQuantity::coupling_stiffness ? tool_stiffness_N_per_m(world, state)
                                                           : max_force_N(world, state);
   }
   if (object < world.rigid.size()) return value_in_feel(feel_of(world, state, object), quantity);
@@ -156,7 +164,7 @@ bool apply_edit(const World& world, WorldState& state, const Edit& edit) noexcep
   const auto range = edit_range(world, state, edit.object, edit.quantity);
   if (!range || !range->has(edit.value)) return false;
   EditedValues& edited = state.edited;
-  if (edit.quantity == EditedQuantity::coupling_stiffness) {
+  if (edit.object == Edit::kTool && edit.quantity == EditedQuantity::coupling_stiffness) {
     edited.coupling_N_per_m = edit.value;
   } else if (edit.quantity == EditedQuantity::max_force) {
     edited.max_force_N = edit.value;

@@ -18,7 +18,7 @@ namespace hybrid {
 
 // The order is part of the recording's format: append only.
 enum class EditedQuantity : std::uint32_t {
-  coupling_stiffness,  // N/m, of the tool
+  coupling_stiffness,  // N/m, of the tool, or of a rigid object that has a stiffness of its own
   max_force,           // N; at most World::limits, which is at most the device's (greatest_force_N())
   static_friction,     // of a rigid object; a larger dynamic_friction is lowered to it
   dynamic_friction,    // of a rigid object; a smaller static_friction is raised to it

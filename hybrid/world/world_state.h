@@ -13,6 +13,7 @@
 #include "device/loop/clock.h"
 #include "device/loop/force_limit.h"
 #include "device/loop/passivity.h"
+#include "hybrid/feel/mixed_coupling.h"
 #include "hybrid/feel/surface_feel.h"
 #include "hybrid/map/occupancy_map.h"
 #include "hybrid/world/async_relaxation.h"
@@ -121,6 +122,7 @@ struct CarriedState {
   glm::dvec3 friction_N{0.0};  // force on the proxy that friction and shading add to the normal force
   std::uint32_t rubbed = 0;    // rigid object that exerts friction_N and carries the proxy
   DampingState damping;
+  MixedCoupling mixed;  // in a scene where objects have stiffnesses of their own, else not pressed
   // `look_mask`: the rigid objects that the map lists within `look_m` of `look_at` along each axis.
   glm::dvec3 look_at{0.0};
   double look_m = -1.0;
@@ -164,8 +166,12 @@ struct WorldState : CarriedState {
 };
 
 // ---- values that may have been edited (edits.h) ----
-inline double coupling_N_per_m(const World& world, const CarriedState& state) noexcept {
+inline double tool_stiffness_N_per_m(const World& world, const CarriedState& state) noexcept {
   return state.edited.coupling_N_per_m.value_or(world.tool.stiffness_N_per_m);
+}
+// Force of the coupling over its length.
+inline double coupling_N_per_m(const World& world, const CarriedState& state) noexcept {
+  return state.mixed.pressed() ? state.mixed.force_per_depth_N_per_m : tool_stiffness_N_per_m(world, state);
 }
 // The force of the virtual coupling on the hand.
 inline glm::dvec3 coupling_force_N(const World& world, const CarriedState& state,

@@ -2,8 +2,9 @@
 // Time and memory from a mesh file to the first touch. Prints one row per file. Each file is measured in its
 // own process.
 //
-//   bench_load [--threads N] [--unit METERS] FILE…   touches each from above, at its highest vertex
-//   bench_load --sphere EDGE FILE.ply                writes a sphere of 12·EDGE² triangles
+//   bench_load [OPTIONS] FILE…         touches each from above, at its highest vertex
+//     --threads N, --unit METERS, --radius METERS (of the tool; 0: a point)
+//   bench_load --sphere EDGE FILE.ply  writes a sphere of 12·EDGE² triangles
 //
 // `peak` is the largest resident memory of the process, and `held` the resident memory at the first touch.
 // `object` and `map` are parts of `held`, as the program accounts for them. `cpu` is the CPU time of all
@@ -12,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -36,6 +38,7 @@ namespace {
 struct Options {
   int threads = 0;  // number of processors to use; 0: all
   double unit_m = 1e-3;
+  double radius_m = 2e-3;  // of the tool
 };
 
 double seconds_of(clockid_t clock) {
@@ -57,6 +60,7 @@ int touch(const std::string& file, const Options& options) {
   const double cpu = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
   hybrid::Scene scene;
   scene.file = file;
+  scene.tool.radius_m = options.radius_m;
   hybrid::RigidDescription rigid;
   rigid.name = "mesh";
   rigid.source = hybrid::MeshSource{.file = file, .unit_m = options.unit_m};
@@ -67,12 +71,13 @@ int touch(const std::string& file, const Options& options) {
   for (const glm::dvec3& v : object.drawn->vertices) top = v.z > top.z ? v : top;
 
   hybrid::set_flush_to_zero();
-  glm::dvec3 tool = top + glm::dvec3(0.0, 0.0, 2.0 * scene.tool.radius_m);
+  const double step_m = std::max(0.05 * options.radius_m, 1e-4);
+  glm::dvec3 tool = top + glm::dvec3(0.0, 0.0, options.radius_m + 20.0 * step_m);
   hybrid::begin_session(scene, *built.world, *built.state, tool);
   bool touched = false;
   double tick_us = 0.0;
   for (int tick = 0; tick < 100 && !touched; ++tick) {
-    tool.z -= 0.05 * scene.tool.radius_m;
+    tool.z -= step_m;
     const hybrid::TickResult felt =
         hybrid::haptic_tick(*built.world, *built.state, {.position_m = tool}, 1e-3);
     touched = felt.contacts != 0;
@@ -99,9 +104,9 @@ int write_sphere(int edge, const std::string& file) {
 }
 
 int usage() {
-  std::fprintf(
-      stderr,
-      "usage: bench_load [--threads N] [--unit METERS] FILE...\n       bench_load --sphere EDGE FILE.ply\n");
+  std::fprintf(stderr,
+               "usage: bench_load [--threads N] [--unit METERS] [--radius METERS] FILE...\n       bench_load "
+               "--sphere EDGE FILE.ply\n");
   return 2;
 }
 
@@ -119,6 +124,8 @@ int main(int argc, char** argv) {
         options.threads = std::atoi(words[1].c_str());
       } else if (words[0] == "--unit") {
         options.unit_m = std::atof(words[1].c_str());
+      } else if (words[0] == "--radius") {
+        options.radius_m = std::atof(words[1].c_str());
       } else {
         return usage();
       }

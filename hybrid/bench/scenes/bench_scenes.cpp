@@ -91,10 +91,10 @@ struct Timed {
   std::vector<Percentiles> repeats;
 };
 
-ForceCourse course_of(const SessionResult& result, double stiffness_N_per_m) {
+ForceCourse course_of(const SessionResult& result) {
   ForceCourse course;
   for (const TraceRow& row : result.rows) {
-    course.push_back({row.device_m, stiffness_N_per_m * (row.proxy_m - row.device_m), row.contacts != 0});
+    course.push_back({row.device_m, row.coupling_N, row.contacts != 0});
   }
   return course;
 }
@@ -126,7 +126,7 @@ void play(const Variant& variant, const Motion& motion, bool timed, const Progre
     to.row.memory_bytes = size.memory_bytes;
     to.row.soft_voxels = size.soft_voxels;
     to.row.faults = fault_texts(built.state->faults);
-    to.course = course_of(result, built.world->tool.stiffness_N_per_m);
+    to.course = course_of(result);
   } catch (const device::StopAsked&) {
     throw;
   } catch (const std::exception& error) {

@@ -244,6 +244,34 @@ Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& t
   return split_force(state, {target, metric, travel}, state.rubbed, smooth);
 }
 
+void mix_stiffness(const World& world, WorldState& state, const glm::dvec3& device_m, double dt_s,
+                   Sweep& sweep) noexcept {
+  const double of_tool = tool_stiffness_N_per_m(world, state);
+  double stiffest = 0.0;
+  for (std::uint32_t o = 0; o < world.rigid.size(); ++o)
+    stiffest = std::max(stiffest, feel_of(world, state, o).stiffness_N_per_m);
+  if (stiffest == 0.0) return;
+  stiffest = std::max(stiffest, of_tool);
+
+  std::array<ObjectStiffness, 4> touched;  // the proxy's active elements, and tissue
+  for (std::uint32_t n = 0; n < state.active_count; ++n) {
+    const double own = feel_of(world, state, state.active[n].object).stiffness_N_per_m;
+    touched[n] = {own > 0.0 ? own : of_tool, glm::length(state.active[n].force_N)};
+  }
+  glm::dvec3 of_tissue(0.0);
+  for (const voxel::Reaction& reaction : state.reactions) of_tissue += reaction.force_N;
+  touched.back() = {of_tool, glm::length(of_tissue)};
+
+  const double before = coupling_N_per_m(world, state);
+  update(state.mixed, glm::length(state.proxy_m - device_m), mean_stiffness(touched, of_tool), stiffest,
+         dt_s);
+  const double scale = coupling_N_per_m(world, state) / before;
+  sweep.force_N *= scale;
+  state.friction_N *= scale;
+  for (std::uint32_t n = 0; n < state.active_count; ++n) state.active[n].force_N *= scale;
+  for (glm::dvec3& force : state.rigid_force_N) force *= scale;
+}
+
 glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,
                        double dt_s) noexcept {
   const Contacts contacts = active_contacts(world, state, state.proxy_m);

@@ -17,6 +17,11 @@ namespace hybrid {
 Sweep sweep_with_feel(const World& world, WorldState& state, const glm::dvec3& target,
                       const glm::dmat3& metric, double travel, bool first_pass) noexcept;
 
+// Updates the coupling for the touched objects, where objects have stiffnesses of their own, and scales the
+// forces on the proxy to it. Call once a tick, with or without contact, after the proxy has moved.
+void mix_stiffness(const World& world, WorldState& state, const glm::dvec3& device_m, double dt_s,
+                   Sweep& sweep) noexcept;
+
 // Damping and texture force, added to the coupling's force on the hand (N, scene frame) and to
 // state.rigid_force_N. `device_m`: the device's position. Call once a tick, with or without contact.
 glm::dvec3 added_force(const World& world, WorldState& state, const glm::dvec3& device_m,

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::uint32_t kMaxSteps = 64;      // steps of one sweep
 constexpr std::uint32_t kMaxExchanges = 64;  // planes added or renewed in one step
+constexpr std::uint32_t kMostStalls = 4;     // steps in a row that do not move the proxy
 constexpr std::uint32_t kMaxCrossings = 16;  // crossings of nearly flat edges in one sweep
 // A shorter step ends the sweep; relative to the way to the target, and to the ball's radius.
 constexpr double kConvergedWay = 1e-9, kConvergedBall = 1e-7;
@@ -95,6 +96,8 @@ class Sweeper {
       travel -= part * length;
       stepped_ = part * length;
       keep_active();
+      stalls_ = sweep.point == point_ ? stalls_ + 1 : 0;
+      if (stalls_ == kMostStalls) break;
       if (fraction_ == 1.0 && part == 1.0) {
         const Crossing crossing = cross_edges(sweep.point, travel);
         if (crossing == Crossing::arrived ||
@@ -263,16 +266,28 @@ class Sweeper {
       // An element has two planes. first_in_the_way() used the plane across its closest point, which tells
       // where the way meets the element. The step is bounded by the plane of the element's face, because the
       // proxy comes to rest on that plane in one step.
+      const ProxyPlane found = first;
       make_plane(first);
+      if (holds(first)) {
+        end_way_before(found);
+        return true;
+      }
       held_[held_count_++] = first;
       state_.scratch.planes.push_back(in_scene(first));
     }
     return true;
   }
 
-  // For a step with too many planes: ends the way at the plane `next`, as it was found. The way would reach
-  // the plane of the element's face later, but elements that were not examined yet may stand before that
-  // plane.
+  // Is this plane held already? Then the minimum is on it, and the element is in the way by rounding only.
+  [[nodiscard]] bool holds(const ProxyPlane& plane) const noexcept {
+    return std::ranges::any_of(held_planes(), [&plane](const ProxyPlane& held) {
+      return held.object == plane.object && held.element == plane.element && held.in_body == plane.in_body;
+    });
+  }
+
+  // For a step with too many planes, or with a plane that is held already: ends the way at the plane `next`,
+  // as it was found. The way would reach the plane of the element's face later, but elements that were not
+  // examined yet may stand before that plane.
   void end_way_before(const ProxyPlane& next) noexcept {
     const BodyFrame& frame = state_.rigid[next.object].frame;
     const glm::dvec3 end = point_ + fraction_ * (minimum_.point - point_);
@@ -398,7 +413,7 @@ class Sweeper {
                   patience = 1;  // steps until the next round step; it doubles after each that did not pay
     glm::dvec3 instead{0.0}, to{0.0};
   } round_;
-  std::uint32_t crossings_ = 0;
+  std::uint32_t crossings_ = 0, stalls_ = 0;
   double stepped_ = 0.0;   // length of the last step
   double fraction_ = 1.0;  // fraction of the way to the minimum that is known to be clear
 };

@@ -238,8 +238,10 @@ TEST_F(SceneFile, TheFeelOfARigidSurface) {
   };
   EXPECT_FALSE(feel_of("").any()) << "off unless asked for";
   const hybrid::FeelDescription all = feel_of(
-      "damping = 2.5\nfriction = [0.5, 0.4]\nshading = true\n[rigid.texture]\nimage = \"relief.png\"\n"
+      "stiffness = 350\ndamping = 2.5\nfriction = [0.5, 0.4]\nshading = true\n[rigid.texture]\nimage = "
+      "\"relief.png\"\n"
       "size = 20\nheight = 0.3\nkind = \"shading\"\nalong = \"y\"\n");
+  EXPECT_EQ(all.stiffness_N_per_m, 350.0);
   EXPECT_EQ(all.damping_N_s_per_m, 2.5);
   EXPECT_EQ(all.static_friction, 0.5);
   EXPECT_EQ(all.dynamic_friction, 0.4);

@@ -112,7 +112,7 @@ const Broken broken[] = {
     {"yield-text", "12:1", "a string", "0.2"},
     {"yield-as-plastic", "12:1", "'plastic'", "yield = 0.2"},
     {"yield-as-elastic", "12:1", "'elastic'", "remove it"},
-    {"later-stiffness", "6:1", "not supported yet", "remove it"},
+    {"rigid-stiffness-zero", "6:1", "is 0", "above 0"},
     {"damping-negative", "6:1", "is -1", "0 or more"},
     {"friction-negative", "6:18", "is -0.1", "friction coefficient"},
     {"friction-reversed", "6:1", "holds less at rest", "static coefficient first"},

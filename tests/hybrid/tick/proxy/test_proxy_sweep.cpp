@@ -8,6 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
+#include <limits>
 #include <optional>
 #include <random>
 
@@ -408,6 +409,30 @@ TEST_F(RigidSweep, AFlatMeshIsFlatWhereverTheToolCrossesItsEdges) {
   EXPECT_LE(worst, 1e-7);
   EXPECT_EQ(touch.state().faults, 0U);
   EXPECT_EQ(touch.state().truncated_ticks, 0U);
+}
+
+// The tops of two boxes lie in one plane. At their seam each box seems to be in the way by rounding.
+TEST_F(RigidSweep, AFlatSeamTakesFewSteps) {
+  const hybrid::BoxPrimitive box{dvec3(0.04, 0.04, 0.02)};
+  Touch touch(
+      scene_of({object("left", box, {-0.02, 0, -0.01}), object("right", box, {0.02, 0, -0.01})}, 2e-3),
+      {-1e-3, 0, 0.01});
+  touch.go({-1e-3, 0, 0.0}, 1e-4);
+  std::uint32_t steps = 0, work = 0;
+  double worst = 0.0;
+  for (int n = -50; n <= 50; ++n) {
+    const dvec3 goal(2e-5 * n, 1e-6 * n, 0.0);
+    const hybrid::Sweep sweep =
+        hybrid::sweep_proxy(touch.world(), touch.state(), touch.state().proxy_m, goal, glm::dmat3(kStiffness),
+                            std::numeric_limits<double>::max());
+    touch.state().proxy_m = sweep.point;
+    steps = std::max(steps, sweep.steps);
+    work = std::max(work, sweep.work);
+    worst = std::max(worst, glm::length(sweep.point - dvec3(goal.x, goal.y, 2e-3)));
+  }
+  EXPECT_LE(steps, 32U);
+  EXPECT_LE(work, 400U);
+  EXPECT_LE(worst, 2.1e-5) << "at most the step of one tick behind";
 }
 
 }  // namespace
