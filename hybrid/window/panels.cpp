@@ -106,97 +106,6 @@ bool open_section(const char* name, bool open = true) {
 
 }  // namespace
 
-namespace controls {
-
-PixelRect take_place(float height) {
-  const ImVec2 at = ImGui::GetCursorScreenPos();
-  const float width = ImGui::GetContentRegionAvail().x;
-  ImGui::Dummy({width, height});
-  return {static_cast<int>(at.x), static_cast<int>(at.y), static_cast<int>(width), static_cast<int>(height)};
-}
-void label_beside(const Pen& pen, const std::string& words) {
-  label(words);
-  ImGui::SameLine(9.2F * pen.em);
-  ImGui::SetNextItemWidth(-0.1F * pen.em);
-}
-void label(const std::string& words) {
-  ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted(words.c_str());
-}
-void same_line() {
-  ImGui::SameLine();
-}
-void begin_fixed(bool fixed) {
-  ImGui::BeginDisabled(fixed);
-}
-void end_fixed() {
-  ImGui::EndDisabled();
-}
-bool button(const char* id, float width) {
-  return ImGui::Button(id, {width, 0.0F});
-}
-bool tick_box(const char* id, bool& on) {
-  return ImGui::Checkbox(id, &on);
-}
-bool radio(const char* id, bool on) {
-  return ImGui::RadioButton(id, on);
-}
-
-std::optional<std::size_t> choose(const char* id, const std::string& shown,
-                                  std::span<const std::string> choices) {
-  std::optional<std::size_t> taken;
-  if (!ImGui::BeginCombo(id, shown.c_str())) return taken;
-  for (std::size_t n = 0; n < choices.size(); ++n) {
-    if (ImGui::Selectable(choices[n].c_str(), choices[n] == shown)) taken = n;
-  }
-  ImGui::EndCombo();
-  return taken;
-}
-
-Slid slide(const char* id, float& value, float low, float high, const std::string& format, bool logarithmic) {
-  const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
-  const bool changed = ImGui::SliderFloat(id, &value, low, high, format.c_str(), flags);
-  return {changed, ImGui::IsItemActive(), ImGui::IsItemDeactivatedAfterEdit()};
-}
-void tip(const std::string& words) {
-  if (ImGui::IsItemHovered() && !ImGui::IsItemActive()) ImGui::SetTooltip("%s", words.c_str());
-}
-
-void write(const std::string& words, bool pale) {
-  ImGui::PushTextWrapPos();
-  if (pale) {
-    ImGui::TextDisabled("%s", words.c_str());
-  } else {
-    ImGui::TextUnformatted(words.c_str());
-  }
-  ImGui::PopTextWrapPos();
-}
-void write_rows(const Pen& pen, const char* id, std::span<const std::array<std::string, 3>> rows) {
-  if (!ImGui::BeginTable(id, 3)) return;
-  ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
-  for (const char* column : {"first", "second"})
-    ImGui::TableSetupColumn(column, ImGuiTableColumnFlags_WidthFixed, pen.width("8 888 888 N"));
-  for (const auto& row : rows) {
-    ImGui::TableNextRow();
-    for (std::size_t n = 0; n < row.size(); ++n) {
-      ImGui::TableNextColumn();
-      const float left = n > 0 ? ImGui::GetContentRegionAvail().x - pen.width(row[n]) : 0.0F;
-      ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(left, 0.0F));
-      ImGui::TextUnformatted(row[n].c_str());
-    }
-  }
-  ImGui::EndTable();
-}
-
-float free_width() {
-  return ImGui::GetContentRegionAvail().x;
-}
-float gap() {
-  return ImGui::GetStyle().ItemSpacing.x;
-}
-
-}  // namespace controls
-
 void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, const TickTimes& times,
                           PanelResult& result) const {
   const ViewState& state = frame.state;
@@ -257,11 +166,7 @@ void Panels::draw_objects(const Pen& pen, const DrawnScene& scene, const Snapsho
             {.verb = ViewVerb::show, .numbers = {visible ? 1.0 : 0.0}, .object = object});
     }
     ImGui::TableNextColumn();
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    const float top = at.y + 0.5F * (ImGui::GetFrameHeight() - pen.em);
-    const ImVec2 end{at.x + pen.em, top + pen.em};
-    ImGui::GetWindowDrawList()->AddRectFilled({at.x, top}, end, ink_of(colour), 2.0F);
-    ImGui::GetWindowDrawList()->AddRect({at.x, top}, end, pen.inks.edge, 2.0F);
+    controls::swatch(pen, colour);
     ImGui::TableNextColumn();
     ImGui::AlignTextToFramePadding();
     const std::string name = pen.fit(object_name(scene, object), ImGui::GetContentRegionAvail().x);
@@ -356,6 +261,7 @@ void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot
   }
   const bool tissue = selected < scene.objects.size() && scene.objects[selected].choices.tissue;
   if (tissue) draw_choices(pen, scene, frame, result);
+  if (selected == Edit::kTool) draw_tool_size(pen, scene, frame, result);
   if (!any && !tissue) ImGui::TextDisabled("Its values are fixed while it is felt.");
   if (selected == Edit::kTool) ImGui::TextDisabled("Select an object above to change its stiffness.");
   if (selected < scene.objects.size()) {
@@ -364,6 +270,7 @@ void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot
     if (ImGui::SliderFloat("##opacity", &opacity, 0.0F, 100.0F, "%.0f %%", ImGuiSliderFlags_AlwaysClamp))
       result.actions.push_back({.verb = ViewVerb::opacity, .numbers = {0.01 * opacity}, .object = selected});
   }
+  if (selected < scene.objects.size()) draw_materials(pen, scene, frame, result);
   if (selected < scene.objects.size()) {
     bool moves = frame.state.moves;
     ImGui::BeginDisabled(!scene.objects[selected].choices.open);
@@ -396,11 +303,10 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   PanelResult& result = result_;
   set_style(pen, frame.state.view.dark);
   ImGui::PushFont(pen.body);
-  if (frame.handles != nullptr) {
-    Pen behind = pen;
-    behind.list = ImGui::GetBackgroundDrawList();
-    draw_move_handles(behind, *frame.handles, frame.camera, frame.scene_place);
-  }
+  Pen behind = pen;
+  behind.list = ImGui::GetBackgroundDrawList();
+  if (frame.state.trail) draw_trail(behind, frame.history, frame.camera, frame.scene_place);
+  if (frame.handles != nullptr) draw_move_handles(behind, *frame.handles, frame.camera, frame.scene_place);
   ImGui::SetNextWindowPos({static_cast<float>(where.x), static_cast<float>(where.y)});
   ImGui::SetNextWindowSize({static_cast<float>(where.width), static_cast<float>(where.height)});
   constexpr ImGuiWindowFlags flags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
@@ -409,38 +315,49 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     if (frame.input.by_keyboard && !ImGui::IsWindowFocused(ImGuiFocusedFlags_ChildWindows))
       ImGui::SetWindowFocus();
     const TickTimes times = frame.history.times();
-    if (open_section("Session")) {
-      draw_session(frame, snapshot, times, result);
-      draw_past(pen, frame, result);
+    if (frame.notes.begins) {
+      if (open_section("Open")) draw_open(frame, result);
+    } else {
+      draw_sections(pen, scene, snapshot, frame, times, result);
     }
-    if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
-    if (has_soft(scene) && open_section("Forces between objects")) {
-      result.wants_presses = true;
-      draw_presses(pen, scene, snapshot, frame);
-    }
-    const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
-    if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
-    if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
-      draw_effect(pen, frame);
-    if (open_section("View")) draw_view(pen, scene, frame, result);
-    if (has_soft(scene) && open_section("Difference of two models", false))
-      draw_difference(pen, scene, snapshot, frame, result);
-    Pen chart = pen;
-    chart.list = ImGui::GetWindowDrawList();
-    if (open_section("Force")) draw_force(chart, scene, frame, result);
-    if (open_section("Ticks")) {
-      draw_tick_times(chart, controls::take_place(kTickChart_em * pen.em), times);
-      draw_stage_times(chart, controls::take_place(kStageRow_em * pen.em * static_cast<float>(kStages)),
-                       times);
-      if (frame.notes.unseen_ticks > 0)
-        ImGui::TextDisabled("%llu ticks are not in the charts",
-                            static_cast<unsigned long long>(frame.notes.unseen_ticks));
-    }
-    if (open_section("Numbers of the tick", !frame.state.watched.empty())) draw_watch(pen, frame, result);
   }
   ImGui::End();
   result.wants_text = ImGui::GetIO().WantTextInput;
   ImGui::PopFont();
+}
+
+void Panels::draw_sections(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                           const PanelFrame& frame, const TickTimes& times, PanelResult& result) {
+  if (open_section("Session")) {
+    draw_session(frame, snapshot, times, result);
+    draw_past(pen, frame, result);
+  }
+  if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
+  if (has_soft(scene) && open_section("Forces between objects")) {
+    result.wants_presses = true;
+    draw_presses(pen, scene, snapshot, frame);
+  }
+  const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
+  if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
+  if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
+    draw_effect(pen, frame);
+  if (open_section("View")) draw_view(pen, scene, frame, result);
+  if (has_soft(scene) && open_section("Difference of two models", false))
+    draw_difference(pen, scene, snapshot, frame, result);
+  Pen chart = pen;
+  chart.list = ImGui::GetWindowDrawList();
+  if (open_section("Force")) draw_force(chart, scene, frame, result);
+  if (open_section("Ticks")) {
+    draw_tick_times(chart, controls::take_place(kTickChart_em * pen.em), times);
+    draw_stage_times(chart, controls::take_place(kStageRow_em * pen.em * static_cast<float>(kStages)), times);
+    draw_rates(pen, frame);
+    if (frame.notes.unseen_ticks > 0)
+      ImGui::TextDisabled("%llu ticks are not in the charts",
+                          static_cast<unsigned long long>(frame.notes.unseen_ticks));
+  }
+  if (open_section("Numbers of the tick", !frame.state.watched.empty())) draw_watch(pen, frame, result);
+  const bool offers = !frame.notes.recent.empty() || !frame.notes.shipped.empty();
+  if (offers && open_section("Open", false)) draw_open(frame, result);
 }
 
 }  // namespace hybrid

@@ -28,8 +28,9 @@ enum class ViewVerb : std::uint8_t {
   go_on,           // the session goes on from the past that is shown
   arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
   select,          // object
-  show,            // object, numbers: 1 visible, 0 hidden
-  opacity,         // object, numbers: 0 to 1
+  show,            // object, numbers: 1 visible, 0 hidden; text: a material of the object, or empty
+  opacity,         // object, numbers: 0 to 1; text: as of show
+  wires,           // numbers: 1 edges of triangles are drawn, 0 not, none: toggle
   clip,            // numbers: 1 on, 0 off, none: toggle
   clip_axis,       // numbers: 0 x, 1 y, 2 z
   clip_place,      // numbers: 0 to 1 along the axis
@@ -41,6 +42,8 @@ enum class ViewVerb : std::uint8_t {
   dark,            // numbers: 1 dark, 0 light, none: toggle
   panels,          // numbers: 1 shown, 0 hidden, none: toggle
   inset,           // numbers: 1 shown, 0 hidden, none: toggle
+  trail,           // numbers: 1 the hand's path of the last seconds is drawn, 0 not, none: toggle
+  open,            // text: a file, which is opened as if it were dropped onto the window
   screenshot,      // text: the file; empty: an unused name
   save_recording,  // text: the file; empty: an unused name
   save_scene,      // writes edits to the scene's file
@@ -67,6 +70,7 @@ struct ViewState {
   bool panels = true;
   std::uint32_t selected = Edit::kTool;
   bool moves = false;                  // arrows on the selected object are shown
+  bool trail = false;                  // the hand's path of the last seconds is drawn
   bool stacked = false;                // the chart of the force shows its parts as areas
   std::vector<std::string> watched{};  // names of numbers (watched_numbers.h)
   // ---- requests to the session; the owner of the session takes counters and lists ----
@@ -79,6 +83,7 @@ struct ViewState {
   std::vector<SceneChange> changes{};
   std::optional<ModelComparison> comparison{};                     // to begin; without an object: to end
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
+  std::vector<std::filesystem::path> opened{};  // files to open, in the order in which they were dropped
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look
 };

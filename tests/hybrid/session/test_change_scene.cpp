@@ -91,7 +91,14 @@ TEST_F(ChangedScene, FeelsAsIfItHadBeenThatSceneFromTheBeginning) {
   const std::string finer = "spacing = 1\n";
   std::string fine = text_of({});
   fine.replace(fine.find("spacing = 2\n"), finer.size(), finer);
-  for (const std::string& text : {text_of({}, 24000.0), text_of(kTrilinear), text_of(kRigid), fine}) {
+  const auto with_gel = [](const std::string& keys) {
+    std::string text = text_of({});
+    return text.insert(text.find("[material.gel]\n") + std::string("[material.gel]\n").size(), keys);
+  };
+  const std::string larger_tool = text_of({}) + "[tool]\nradius = 3\n";
+  for (const std::string& text :
+       {text_of({}, 24000.0), text_of(kTrilinear), text_of(kRigid), fine, with_gel("poisson = 0.45\n"),
+        with_gel("stretch = [0.8, 1.2]\nshear = 0.2\n"), larger_tool}) {
     begin(text_of({}));
     steps(400);
     const double before = glm::length(player_->felt().force_N);
