@@ -111,6 +111,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     snapshot.difference = difference.found();
     SessionNotes notes = notes_of(player, snapshot.t_s, files.message(), effect);
     PastView::add_notes(player, snapshot.t_s, notes);
+    if (input.wants_boxes && !shows_past) notes.boxes = map_boxes(*viewed->built.world, player.state());
     const Snapshot& seen = shows_past ? past.snapshot(player, *back, request.asked.get(), snapshot.difference)
                                       : std::as_const(snapshot);
     session_s += thread_time_s() - session_began_s;

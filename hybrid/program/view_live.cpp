@@ -19,33 +19,35 @@
 namespace hybrid {
 namespace {
 
-// Keeps the forces between objects for the window's list. To compute them the session is held for a moment:
-// a simulated hand does not notice, because held time does not count. A real hand would, so with a real
-// device they are computed only while the session is paused.
-class PressWatch {
+// Keeps what the window shows of the state between two ticks. To read it the session is held for a moment: a
+// simulated hand does not notice, because held time does not count. A real hand would, so with a real device
+// it is read only while the session is paused.
+template <class Value>
+class HeldWatch {
  public:
-  const std::vector<PairPress>& presses(const WindowInput& input, const PlayRequest& request,
-                                        const Player& player, LiveSession& session, std::uint64_t tick) {
+  template <class Read>
+  const Value& follow(bool wanted, const PlayRequest& request, const Player& player, LiveSession& session,
+                      std::uint64_t tick, const Read& read) {
     const auto now = std::chrono::steady_clock::now();
-    if (!input.wants_presses || (player.is_real() && !request.paused)) {
-      presses_.clear();
+    if (!wanted || (player.is_real() && !request.paused)) {
+      value_ = {};
       tick_ = kNever;
     } else if (tick != tick_ && now >= next_ && session.hold(request)) {
-      presses_ = player.presses();
+      value_ = read();
       session.ask(request);
       tick_ = tick;
       const auto end = std::chrono::steady_clock::now();
       next_ = end + std::max<std::chrono::steady_clock::duration>(kEvery, kRest * (end - now));
     }
-    return presses_;
+    return value_;
   }
 
  private:
   static constexpr std::uint64_t kNever = ~std::uint64_t{0};
-  static constexpr std::chrono::milliseconds kEvery{200};  // least time between two updates of the list
+  static constexpr std::chrono::milliseconds kEvery{200};  // least time between two readings
   static constexpr int kRest = 19;  // the session is held for at most one part in 20 of the time
-  std::vector<PairPress> presses_;
-  std::uint64_t tick_ = kNever;  // of presses_
+  Value value_{};
+  std::uint64_t tick_ = kNever;  // of value_
   std::chrono::steady_clock::time_point next_{};
 };
 
@@ -67,6 +69,7 @@ struct LiveWindow {
   std::unique_ptr<OpenedScene> opened{};  // the scene in which the window goes on
   std::vector<OfferedScene> recent = recent_scenes(), shipped = shipped_scenes();
   ThreadRates rates{};
+  std::vector<MapBox> boxes{};
 };
 
 SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
@@ -77,6 +80,7 @@ SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) 
   notes.recent = live.recent;
   notes.shipped = live.shipped;
   notes.rates = live.rates.rates();
+  notes.boxes = live.boxes;
   if (live.opener.loading()) notes.message = "opening the scene; the session goes on meanwhile";
   if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
   PastView::add_notes(player, t_s, notes);
@@ -151,7 +155,8 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
   LiveSession session(*viewed->player, box);
   Player& player = *viewed->player;
   Snapshot shown;
-  PressWatch watch;
+  HeldWatch<std::vector<PairPress>> presses;
+  HeldWatch<std::vector<MapBox>> boxes;
   PastView past;
   RestWish rest;
   auto keep_next = std::chrono::steady_clock::now();
@@ -172,7 +177,8 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
     if (take_changed_scene(live, viewed, session, request)) {
       live.difference.forget();
       request.asked = nullptr;
-      watch = {};
+      presses = {};
+      boxes = {};
     }
     rest.follow(input.compares_with_rest, player, live.files,
                 [&](const auto& change) { session.between_ticks(request, change); });
@@ -188,7 +194,10 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
     session.ask(request);
     if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
     session.shown(viewed->drawn, shown);
-    shown.presses = watch.presses(input, request, player, session, shown.tick);
+    shown.presses = presses.follow(input.wants_presses, request, player, session, shown.tick,
+                                   [&] { return player.presses(); });
+    live.boxes = boxes.follow(input.wants_boxes, request, player, session, shown.tick,
+                              [&] { return map_boxes(*viewed->built.world, player.state()); });
     if (input.comparison) live.difference.ask(*input.comparison, *viewed, shown);
     shown.difference = live.difference.found();
     say_error(live.difference, live.files);

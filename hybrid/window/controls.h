@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The controls of the panel. This header needs no library of controls; controls.cpp implements it with one.
+// The controls of the panel. This header needs no library of controls; panels.cpp implements it with one.
 // Each control of a panel has its own `id`. Text after "##" in an `id` is not shown.
 #pragma once
 

@@ -106,6 +106,121 @@ bool open_section(const char* name, bool open = true) {
 
 }  // namespace
 
+namespace controls {
+namespace {
+
+constexpr float kLabel_em = 9.2F;  // width of the column of labels (unit: body text)
+
+}  // namespace
+
+PixelRect take_place(float height) {
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const float width = ImGui::GetContentRegionAvail().x;
+  ImGui::Dummy({width, height});
+  return {static_cast<int>(at.x), static_cast<int>(at.y), static_cast<int>(width), static_cast<int>(height)};
+}
+void label_beside(const Pen& pen, const std::string& words) {
+  label(words);
+  ImGui::SameLine(kLabel_em * pen.em);
+  ImGui::SetNextItemWidth(-0.1F * pen.em);
+}
+void label(const std::string& words) {
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted(words.c_str());
+}
+void tick_beside(const Pen& pen, const std::string& words, const glm::vec3& colour, bool& on) {
+  swatch(pen, colour);
+  ImGui::SameLine();
+  const std::string id = "##shown " + words;
+  ImGui::Checkbox(id.c_str(), &on);
+  ImGui::SameLine();
+  const float left = ImGui::GetCursorPosX();
+  label(pen.fit(words, kLabel_em * pen.em - left));
+  ImGui::SameLine(kLabel_em * pen.em);
+  ImGui::SetNextItemWidth(-0.1F * pen.em);
+}
+void swatch(const Pen& pen, const glm::vec3& colour) {
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const float top = at.y + 0.5F * (ImGui::GetFrameHeight() - pen.em);
+  const ImVec2 end{at.x + pen.em, top + pen.em};
+  ImGui::GetWindowDrawList()->AddRectFilled({at.x, top}, end, ink_of(colour), 2.0F);
+  ImGui::GetWindowDrawList()->AddRect({at.x, top}, end, pen.inks.edge, 2.0F);
+  ImGui::Dummy({pen.em, pen.em});
+}
+void same_line() {
+  ImGui::SameLine();
+}
+void begin_fixed(bool fixed) {
+  ImGui::BeginDisabled(fixed);
+}
+void end_fixed() {
+  ImGui::EndDisabled();
+}
+bool button(const char* id, float width) {
+  return ImGui::Button(id, {width, 0.0F});
+}
+bool tick_box(const char* id, bool& on) {
+  return ImGui::Checkbox(id, &on);
+}
+bool radio(const char* id, bool on) {
+  return ImGui::RadioButton(id, on);
+}
+
+std::optional<std::size_t> choose(const char* id, const std::string& shown,
+                                  std::span<const std::string> choices) {
+  std::optional<std::size_t> taken;
+  if (!ImGui::BeginCombo(id, shown.c_str())) return taken;
+  for (std::size_t n = 0; n < choices.size(); ++n) {
+    if (ImGui::Selectable(choices[n].c_str(), choices[n] == shown)) taken = n;
+  }
+  ImGui::EndCombo();
+  return taken;
+}
+
+Slid slide(const char* id, float& value, float low, float high, const std::string& format, bool logarithmic) {
+  const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+  const bool changed = ImGui::SliderFloat(id, &value, low, high, format.c_str(), flags);
+  return {changed, ImGui::IsItemActive(), ImGui::IsItemDeactivatedAfterEdit()};
+}
+void tip(const std::string& words) {
+  if (ImGui::IsItemHovered() && !ImGui::IsItemActive()) ImGui::SetTooltip("%s", words.c_str());
+}
+
+void write(const std::string& words, bool pale) {
+  ImGui::PushTextWrapPos();
+  if (pale) {
+    ImGui::TextDisabled("%s", words.c_str());
+  } else {
+    ImGui::TextUnformatted(words.c_str());
+  }
+  ImGui::PopTextWrapPos();
+}
+void write_rows(const Pen& pen, const char* id, std::span<const std::array<std::string, 3>> rows) {
+  if (!ImGui::BeginTable(id, 3)) return;
+  ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
+  for (const char* column : {"first", "second"})
+    ImGui::TableSetupColumn(column, ImGuiTableColumnFlags_WidthFixed, pen.width("8 888 888 N"));
+  for (const auto& row : rows) {
+    ImGui::TableNextRow();
+    for (std::size_t n = 0; n < row.size(); ++n) {
+      ImGui::TableNextColumn();
+      const float left = n > 0 ? ImGui::GetContentRegionAvail().x - pen.width(row[n]) : 0.0F;
+      ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(left, 0.0F));
+      ImGui::TextUnformatted(row[n].c_str());
+    }
+  }
+  ImGui::EndTable();
+}
+
+float free_width() {
+  return ImGui::GetContentRegionAvail().x;
+}
+float gap() {
+  return ImGui::GetStyle().ItemSpacing.x;
+}
+
+}  // namespace controls
+
 void Panels::draw_session(const PanelFrame& frame, const Snapshot& snapshot, const TickTimes& times,
                           PanelResult& result) const {
   const ViewState& state = frame.state;
@@ -219,78 +334,6 @@ void Panels::draw_presses(const Pen& pen, const DrawnScene& scene, const Snapsho
   ImGui::EndTable();
 }
 
-void Panels::draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
-                         PanelResult& result) {
-  const double unit = si_of_unit(value.quantity);
-  const std::string unit_words(unit_of(value.quantity));
-  controls::label_beside(pen, words_of_value(value.quantity));
-  float shown = moved_ == index ? moved_to_ : static_cast<float>(now / unit);
-  const std::string format = number_format(shown) + (unit_words.empty() ? "" : " " + unit_words);
-  const int flags = ImGuiSliderFlags_AlwaysClamp | (value.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
-  ImGui::PushID(static_cast<int>(index));
-  const bool changed = ImGui::SliderFloat("##value", &shown, static_cast<float>(value.usual.low / unit),
-                                          static_cast<float>(value.usual.high / unit), format.c_str(), flags);
-  if (ImGui::IsItemHovered() && now != value.in_scene)
-    ImGui::SetTooltip("in the scene: %s %s", with_digits(value.in_scene / unit, 3).c_str(),
-                      unit_words.c_str());
-  if (changed) {
-    moved_to_ = shown;
-    const double si = std::clamp(static_cast<double>(shown) * unit, value.range.low, value.range.high);
-    result.actions.push_back(
-        {.verb = ViewVerb::edit, .numbers = {si}, .object = value.object, .quantity = value.quantity});
-  }
-  if (ImGui::IsItemActive()) {
-    moved_ = index;
-    moved_to_ = shown;
-  } else if (moved_ == index) {
-    moved_ = static_cast<std::size_t>(-1);
-  }
-  ImGui::PopID();
-}
-
-void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
-                         const PanelFrame& frame, PanelResult& result) {
-  const std::uint32_t selected = frame.state.selected;
-  bool any = false, edited = false;
-  for (std::size_t n = 0; n < scene.editable.size() && n < snapshot.values.size(); ++n) {
-    const EditableValue& value = scene.editable[n];
-    if (value.object != selected) continue;
-    draw_slider(pen, n, value, snapshot.values[n], result);
-    any = true;
-    edited = edited || snapshot.values[n] != value.in_scene;
-  }
-  const bool tissue = selected < scene.objects.size() && scene.objects[selected].choices.tissue;
-  if (tissue) draw_choices(pen, scene, frame, result);
-  if (selected == Edit::kTool) draw_tool_size(pen, scene, frame, result);
-  if (!any && !tissue) ImGui::TextDisabled("Its values are fixed while it is felt.");
-  if (selected == Edit::kTool) ImGui::TextDisabled("Select an object above to change its stiffness.");
-  if (selected < scene.objects.size()) {
-    controls::label_beside(pen, "opacity");
-    float opacity = 100.0F * frame.state.view.look_of(selected).opacity;
-    if (ImGui::SliderFloat("##opacity", &opacity, 0.0F, 100.0F, "%.0f %%", ImGuiSliderFlags_AlwaysClamp))
-      result.actions.push_back({.verb = ViewVerb::opacity, .numbers = {0.01 * opacity}, .object = selected});
-  }
-  if (selected < scene.objects.size()) draw_materials(pen, scene, frame, result);
-  if (selected < scene.objects.size()) {
-    bool moves = frame.state.moves;
-    ImGui::BeginDisabled(!scene.objects[selected].choices.open);
-    if (ImGui::Checkbox("arrows to move it (O)", &moves))
-      result.actions.push_back({.verb = ViewVerb::arrows, .numbers = {moves ? 1.0 : 0.0}});
-    ImGui::EndDisabled();
-  }
-  ImGui::BeginDisabled(!edited);
-  if (any && ImGui::Button("Values of the scene")) {
-    for (const EditableValue& value : scene.editable) {
-      if (value.object == selected)
-        result.actions.push_back({.verb = ViewVerb::edit,
-                                  .numbers = {value.in_scene},
-                                  .object = value.object,
-                                  .quantity = value.quantity});
-    }
-  }
-  ImGui::EndDisabled();
-}
-
 void Panels::take_input() {
   ImGuiIO& io = ImGui::GetIO();
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
@@ -305,8 +348,14 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   ImGui::PushFont(pen.body);
   Pen behind = pen;
   behind.list = ImGui::GetBackgroundDrawList();
+  const PixelRect& scene_place = frame.scene_place;
+  behind.list->PushClipRect({static_cast<float>(scene_place.x), static_cast<float>(scene_place.y)},
+                            {static_cast<float>(scene_place.x + scene_place.width),
+                             static_cast<float>(scene_place.y + scene_place.height)});
+  if (frame.state.map) draw_map_boxes(behind, frame.notes.boxes, frame.camera, frame.scene_place);
   if (frame.state.trail) draw_trail(behind, frame.history, frame.camera, frame.scene_place);
   if (frame.handles != nullptr) draw_move_handles(behind, *frame.handles, frame.camera, frame.scene_place);
+  behind.list->PopClipRect();
   ImGui::SetNextWindowPos({static_cast<float>(where.x), static_cast<float>(where.y)});
   ImGui::SetNextWindowSize({static_cast<float>(where.width), static_cast<float>(where.height)});
   constexpr ImGuiWindowFlags flags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |

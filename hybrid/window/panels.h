@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "hybrid/snapshot/map_boxes.h"
 #include "hybrid/view/layout.h"
 #include "hybrid/view/overlay_panel.h"
 #include "hybrid/view/text_painter.h"
@@ -47,7 +48,8 @@ struct SessionNotes {
   std::vector<OfferedScene> recent{}, shipped{};  // scenes to open
   bool begins = false;                            // nothing is played yet: a scene is to be chosen
   std::vector<ThreadRate> rates{};
-  std::string comparing{};  // progress of a comparison of two models; empty: none goes on
+  std::vector<MapBox> boxes{};  // near the tool, if the user asked for them
+  std::string comparing{};      // progress of a comparison of two models; empty: none goes on
 };
 
 // The data that the panel shows in one frame.
@@ -87,6 +89,7 @@ class Panels final : public OverlayPanel {
                     const PanelFrame& frame, PanelResult& result) const;
   void draw_presses(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                     const PanelFrame& frame) const;
+  // ---- panel_values.cpp ----
   void draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const PanelFrame& frame,
                    PanelResult& result);
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
@@ -157,6 +160,11 @@ class Panels final : public OverlayPanel {
 // Draws the arrows by which an object is moved (panel_handles.cpp).
 void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera& camera,
                        const PixelRect& where);
+
+// Draws cells of the map (rigid: orange, soft: green) and patches (blue, the coarser the paler)
+// (panel_map.cpp).
+void draw_map_boxes(const Pen& pen, const std::vector<MapBox>& boxes, const Camera& camera,
+                    const PixelRect& where);
 
 // Draws the path of the hand as the history has it, the oldest part pale (panel_handles.cpp).
 void draw_trail(const Pen& pen, const TickHistory& history, const Camera& camera, const PixelRect& where);

@@ -42,7 +42,7 @@ struct ScriptCommand {
   ScriptArguments arguments;
   std::string_view example;
 };
-constexpr std::array<ScriptCommand, 45> kScriptCommands{
+constexpr std::array<ScriptCommand, 46> kScriptCommands{
     {{"pause", ViewVerb::pause, ScriptArguments::on_or_off, "pause on"},
      {"step", ViewVerb::step, ScriptArguments::none, "step"},
      {"rest", ViewVerb::rest, ScriptArguments::on_or_off, "rest on"},
@@ -69,6 +69,7 @@ constexpr std::array<ScriptCommand, 45> kScriptCommands{
      {"show", ViewVerb::show, ScriptArguments::look_of, "show bone"},
      {"hide", ViewVerb::show, ScriptArguments::look_of, "hide abdomen fat"},
      {"opacity", ViewVerb::opacity, ScriptArguments::look_of, "opacity bone 0.3"},
+     {"map", ViewVerb::map, ScriptArguments::on_or_off, "map on"},
      {"trail", ViewVerb::trail, ScriptArguments::on_or_off, "trail on"},
      {"open", ViewVerb::open, ScriptArguments::file, "open scenes/cube.toml"},
      {"wires", ViewVerb::wires, ScriptArguments::on_or_off, "wires on"},

@@ -175,6 +175,9 @@ void act(ViewState& state, const ViewAction& action) {
     case ViewVerb::arrows:
       set_or_flip(state.moves, action);
       return;
+    case ViewVerb::map:
+      set_or_flip(state.map, action);
+      return;
     case ViewVerb::trail:
       set_or_flip(state.trail, action);
       return;

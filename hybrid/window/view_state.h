@@ -42,6 +42,7 @@ enum class ViewVerb : std::uint8_t {
   dark,            // numbers: 1 dark, 0 light, none: toggle
   panels,          // numbers: 1 shown, 0 hidden, none: toggle
   inset,           // numbers: 1 shown, 0 hidden, none: toggle
+  map,             // numbers: 1 cells of the map and patches are drawn, 0 not, none: toggle
   trail,           // numbers: 1 the hand's path of the last seconds is drawn, 0 not, none: toggle
   open,            // text: a file, which is opened as if it were dropped onto the window
   screenshot,      // text: the file; empty: an unused name
@@ -70,6 +71,7 @@ struct ViewState {
   bool panels = true;
   std::uint32_t selected = Edit::kTool;
   bool moves = false;                  // arrows on the selected object are shown
+  bool map = false;                    // cells of the map near the tool, and patches, are drawn
   bool trail = false;                  // the hand's path of the last seconds is drawn
   bool stacked = false;                // the chart of the force shows its parts as areas
   std::vector<std::string> watched{};  // names of numbers (watched_numbers.h)

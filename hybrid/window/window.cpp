@@ -405,6 +405,7 @@ WindowInput Window::take_input() {
   return {.dragged_goal_m = s.goal_m,
           .paused = s.user.paused,
           .wants_presses = s.wants_presses,
+          .wants_boxes = s.user.map && s.user.panels,
           .compares_with_rest = s.user.compares_with_rest,
           .speed = s.user.speed,
           .restarts = s.user.restarts,

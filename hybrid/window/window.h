@@ -31,6 +31,7 @@ struct WindowInput {
   std::optional<glm::dvec3> dragged_goal_m;
   bool paused = false;
   bool wants_presses = false;  // the frame shows Snapshot::presses
+  bool wants_boxes = false;    // the frame shows SessionNotes::boxes
   bool compares_with_rest = false;
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
