@@ -58,7 +58,8 @@ int view_from_list(const ViewCommand& command) {
   ViewScript script = read_script(command.script, nothing);
   Window window(nothing, {.width = command.width, .height = command.height});
   const device::StopOnSignal stop;
-  const auto began = std::chrono::steady_clock::now();
+  auto began = std::chrono::steady_clock::now();
+  bool shown = false;  // the driver takes its time for the first frame, which is not the script's
   SceneOpener opener(command);
   SessionNotes notes{.recent = recent_scenes(), .shipped = shipped_scenes(), .begins = true};
   for (;;) {
@@ -83,6 +84,7 @@ int view_from_list(const ViewCommand& command) {
     if (std::string error = opener.take_error(); !error.empty()) notes.error = std::move(error);
     notes.message = opener.loading() ? "opening the scene" : "Choose a scene in the list, or drop one here.";
     if (!window.frame({}, notes)) return 0;
+    if (!std::exchange(shown, true)) began = std::chrono::steady_clock::now();
     if (const auto picture = window.take_screenshot(); picture && !picture->empty())
       save_frame(window, *picture);
     if (const int signal = device::stop_signal(); signal != 0) return exit_status_of_signal(signal);

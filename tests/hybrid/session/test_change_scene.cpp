@@ -98,7 +98,7 @@ TEST_F(ChangedScene, FeelsAsIfItHadBeenThatSceneFromTheBeginning) {
   fine.replace(fine.find("spacing = 2\n"), finer.size(), finer);
   const std::string larger_tool = text_of({}) + "[tool]\nradius = 3\n";
   for (const std::string& text : {text_of({}, 24000.0), text_of(kTrilinear), text_of(kRigid), fine,
-                                  with_gel("poisson = 0.45\n"), larger_tool}) {
+                                  with_gel("poisson = 0.1\n"), larger_tool}) {
     begin(text_of({}));
     steps(400);
     const double before = glm::length(player_->felt().force_N);
