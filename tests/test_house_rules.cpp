@@ -145,8 +145,8 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"program/help", {"scene"}},
         {"program/view", {"models", "window"}},
         {"program",
-         {"bench", "bench/reports", "bench/scenes", "bench/thesis", "program/help", "program/view", "stability",
-          "study", "validate"}}}},
+         {"bench", "bench/reports", "bench/scenes", "bench/thesis", "program/help", "program/view",
+          "stability", "study", "validate"}}}},
       {"interface", {{"", {}}, {"examples", {}}}},
   };
   return kRooms;
