@@ -143,9 +143,10 @@ const std::map<std::string, std::vector<Room>>& rooms() {
         {"validate", {"page", "compare"}},
         {"study", {"tune", "compose"}},
         {"program/help", {"scene"}},
+        {"program/view", {"models", "window"}},
         {"program",
-         {"bench", "bench/reports", "bench/scenes", "bench/thesis", "program/help", "stability", "study",
-          "validate", "window"}}}},
+         {"bench", "bench/reports", "bench/scenes", "bench/thesis", "program/help", "program/view",
+          "stability", "study", "validate"}}}},
       {"interface", {{"", {}}, {"examples", {}}}},
   };
   return kRooms;

@@ -11,6 +11,7 @@
 #include "hybrid/build/build_world.h"
 #include "hybrid/compare/compare_measured.h"
 #include "hybrid/compose/compose.h"
+#include "hybrid/program/view/view_command.h"
 #include "hybrid/session/black_box.h"
 #include "hybrid/study/judge_scan.h"
 
@@ -172,18 +173,6 @@ struct ValidateCommand {
 };
 int validate(const ValidateCommand& command);  // the exit status is 1 if a stated case does not hold
 
-struct ViewCommand {
-  std::filesystem::path scene;
-  std::optional<std::uint64_t>
-      frames;  // number of frames before the window closes; each is written to `out` if that is given
-  int width = 1280, height = 960;  // of the window (screen units; pixels on most displays)
-  std::filesystem::path out;
-  std::filesystem::path video;   // the frames as a video; empty: none
-  std::filesystem::path drag;    // CSV of positions (t, x, y, z) that replace the mouse
-  std::filesystem::path script;  // actions of a user at given times; empty: none
-  std::filesystem::path record;  // recording of the session, written when the window closes; empty: none
-  std::string device;            // replaces the scene's device; empty: the scene's
-};
 int view(const ViewCommand& command);
 
 // Progress on standard error. A terminal shows one line that is overwritten. Otherwise, after the first

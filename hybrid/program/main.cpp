@@ -348,7 +348,7 @@ void add_validate(CLI::App& app, int& status) {
 void add_view(CLI::App& app, int& status) {
   auto* sub = app.add_subcommand("view", "A window; the mouse drags the tool (right button)");
   auto c = std::make_shared<hybrid::ViewCommand>();
-  sub->add_option("SCENE", c->scene, "scene file (.toml)")->required();
+  sub->add_option("SCENE", c->scene, "scene file (.toml); without it, the window offers scenes");
   sub->add_option("--frames", c->frames, "close after this many frames")->check(CLI::PositiveNumber);
   sub->add_option("--out", c->out, "write each frame as PNG into this folder");
   sub->add_option("--video", c->video, "write the frames as a video (.mp4, .mkv, .webm; needs ffmpeg)");

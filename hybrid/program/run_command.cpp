@@ -18,7 +18,7 @@
 #include "hybrid/program/commands.h"
 #include "hybrid/program/report_page.h"
 #include "hybrid/program/run_page.h"
-#include "hybrid/program/viewed_scene.h"
+#include "hybrid/program/view/viewed_scene.h"
 #include "hybrid/session/export_shapes.h"
 #include "hybrid/session/outputs.h"
 #include "hybrid/session/real_device.h"

@@ -2,12 +2,16 @@
 // The viewer: builds the scene and opens the window, in which view_frames.cpp or view_live.cpp plays it.
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdio>
+#include <stdexcept>
 #include <utility>
 
 #include "hybrid/program/commands.h"
+#include "hybrid/program/view/offered_scenes.h"
+#include "hybrid/program/view/viewed_scene.h"
+#include "hybrid/program/view_files.h"
 #include "hybrid/program/view_steps.h"
-#include "hybrid/program/viewed_scene.h"
 #include "hybrid/session/outputs.h"
 #include "hybrid/session/real_device.h"
 #include "hybrid/window/glfw_library.h"
@@ -31,9 +35,66 @@ void ask_video(const ViewCommand& command) {
   require_ffmpeg();
 }
 
+// Plays a scene, and each one that the user opens after it.
+int play_in_turn(ViewCommand command, std::unique_ptr<ViewedScene> viewed, Window& window, ViewScript& script,
+                 std::chrono::steady_clock::time_point began) {
+  for (;;) {
+    note_recent_scene(command.scene);
+    LiveEnd end = play_live(command, std::move(viewed), window, script, began);
+    if (end.next == nullptr) return end.status;
+    command = end.next->command;
+    viewed = std::move(end.next->viewed);
+    print_notes(viewed->built);
+  }
+}
+
+// Opens a window without a scene, in which the user chooses one.
+int view_from_list(const ViewCommand& command) {
+  if (command.frames || !command.drag.empty() || !command.record.empty() || !command.device.empty())
+    throw std::runtime_error(
+        "--frames, --drag, --record and --device need a scene: hybrid view SCENE.toml …");
+  const GlfwLibrary display;
+  const DrawnScene nothing{.title = "Choose a scene", .objects = {}};
+  ViewScript script = read_script(command.script, nothing);
+  Window window(nothing, {.width = command.width, .height = command.height});
+  const device::StopOnSignal stop;
+  auto began = std::chrono::steady_clock::now();
+  bool shown = false;  // the driver takes its time for the first frame, which is not the script's
+  SceneOpener opener(command);
+  SessionNotes notes{.recent = recent_scenes(), .shipped = shipped_scenes(), .begins = true};
+  for (;;) {
+    script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count(), window);
+    const WindowInput input = window.take_input();
+    for (const std::filesystem::path& file : input.opened) {
+      notes.error.clear();
+      if (kind_of_file(file) == DroppedKind::scene) {
+        opener.ask(file);
+      } else {
+        notes.error = kind_of_file(file) == DroppedKind::mesh
+                          ? "A mesh is added to a scene. Open a scene first."
+                          : why_not_opened(file);
+      }
+    }
+    if (auto opened = opener.poll()) {
+      window.show_scene(opened->viewed->drawn);
+      window.act({.verb = ViewVerb::look, .text = "all"});
+      print_notes(opened->viewed->built);
+      return play_in_turn(opened->command, std::move(opened->viewed), window, script, began);
+    }
+    if (std::string error = opener.take_error(); !error.empty()) notes.error = std::move(error);
+    notes.message = opener.loading() ? "opening the scene" : "Choose a scene in the list, or drop one here.";
+    if (!window.frame({}, notes)) return 0;
+    if (!std::exchange(shown, true)) began = std::chrono::steady_clock::now();
+    if (const auto picture = window.take_screenshot(); picture && !picture->empty())
+      save_frame(window, *picture);
+    if (const int signal = device::stop_signal(); signal != 0) return exit_status_of_signal(signal);
+  }
+}
+
 }  // namespace
 
 int view(const ViewCommand& command) {
+  if (command.scene.empty()) return view_from_list(command);
   std::unique_ptr<ViewedScene> viewed = read_viewed_scene(command);
   Scene& scene = viewed->scene;
   // --frames writes reproducible pictures. With a real device they would not be reproducible.
@@ -66,7 +127,7 @@ int view(const ViewCommand& command) {
     viewed->player->relax_at_once();
     return play_frames(command, std::move(viewed), window, script);
   }
-  return play_live(command, std::move(viewed), window, std::move(script));
+  return play_in_turn(command, std::move(viewed), window, script, std::chrono::steady_clock::now());
 }
 
 }  // namespace hybrid

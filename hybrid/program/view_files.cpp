@@ -15,8 +15,8 @@
 namespace hybrid {
 namespace {
 
-constexpr std::chrono::seconds kShown{6};  // time for which a message is shown
-constexpr int kMostNames = 10'000;         // numbers that are tried for a new file name
+constexpr std::chrono::seconds kShown{6}, kErrorShown{20};  // time for which a result, an error is shown
+constexpr int kMostNames = 10'000;                          // numbers that are tried for a new file name
 
 }  // namespace
 
@@ -32,11 +32,16 @@ ViewFiles::ViewFiles(const ViewCommand& command) : command_(command) {
 
 void ViewFiles::say(std::string words) {
   message_ = std::move(words);
-  said_ = std::chrono::steady_clock::now();
+  shown_until_ = std::chrono::steady_clock::now() + kShown;
+}
+
+void ViewFiles::say_error(std::string words) {
+  message_ = std::move(words);
+  shown_until_ = std::chrono::steady_clock::now() + kErrorShown;
 }
 
 std::string ViewFiles::message() const {
-  return std::chrono::steady_clock::now() - said_ < kShown ? message_ : std::string();
+  return std::chrono::steady_clock::now() < shown_until_ ? message_ : std::string();
 }
 
 // A file name that does not exist yet, in the frames' folder or else in the current one.

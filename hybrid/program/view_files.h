@@ -9,7 +9,7 @@
 #include <string>
 
 #include "hybrid/program/commands.h"
-#include "hybrid/program/viewed_scene.h"
+#include "hybrid/program/view/viewed_scene.h"
 #include "hybrid/window/window.h"
 
 namespace hybrid {
@@ -30,7 +30,9 @@ class ViewFiles {
   [[nodiscard]] bool save_at_end(const ViewedScene& viewed) const;
 
   void say(std::string words);
-  // The result of the last action, for a few seconds; then empty.
+  // Says why something failed, for longer than a result.
+  void say_error(std::string words);
+  // The result of the last action, for some seconds; then empty.
   [[nodiscard]] std::string message() const;
 
  private:
@@ -41,7 +43,7 @@ class ViewFiles {
 
   const ViewCommand& command_;
   std::string message_;
-  std::chrono::steady_clock::time_point said_{};
+  std::chrono::steady_clock::time_point shown_until_{};
 };
 
 }  // namespace hybrid

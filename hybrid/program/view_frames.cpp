@@ -63,6 +63,15 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     PlayRequest request = request_of(input);
     for (const Edit& edit : input.edits) player.edit(edit);
     for (const SceneChange& change : input.changes) changer.ask(change);
+    for (const std::filesystem::path& file : input.opened) {
+      if (kind_of_file(file) == DroppedKind::mesh) {
+        changer.add_mesh(file);
+      } else if (kind_of_file(file) == DroppedKind::scene) {
+        files.say_error("Frames show one scene. Without --frames, " + file.string() + " would be opened.");
+      } else {
+        files.say_error(why_not_opened(file));
+      }
+    }
     try {
       if (auto next = changer.wait(*viewed)) {
         ChangeMade made = player.change_scene(next->scene, next->built, next->drawn, next->text);
@@ -102,6 +111,7 @@ int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
     snapshot.difference = difference.found();
     SessionNotes notes = notes_of(player, snapshot.t_s, files.message(), effect);
     PastView::add_notes(player, snapshot.t_s, notes);
+    if (input.wants_boxes && !shows_past) notes.boxes = map_boxes(*viewed->built.world, player.state());
     const Snapshot& seen = shows_past ? past.snapshot(player, *back, request.asked.get(), snapshot.difference)
                                       : std::as_const(snapshot);
     session_s += thread_time_s() - session_began_s;

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "device/loop/stop_signal.h"
+#include "hybrid/program/view/offered_scenes.h"
+#include "hybrid/program/view/thread_rates.h"
 #include "hybrid/program/view_files.h"
 #include "hybrid/program/view_steps.h"
 #include "hybrid/session/live_session.h"
@@ -17,33 +19,35 @@
 namespace hybrid {
 namespace {
 
-// Keeps the forces between objects for the window's list. The session is held for a moment while they are
-// computed. A simulated hand does not feel this, because held time does not count. A real hand would feel it,
-// so with a real device they are computed only in a pause.
-class PressWatch {
+// Keeps what the window shows of the state between two ticks. To read it the session is held for a moment: a
+// simulated hand does not notice, because held time does not count. A real hand would, so with a real device
+// it is read only while the session is paused.
+template <class Value>
+class HeldWatch {
  public:
-  const std::vector<PairPress>& presses(const WindowInput& input, const PlayRequest& request,
-                                        const Player& player, LiveSession& session, std::uint64_t tick) {
+  template <class Read>
+  const Value& follow(bool wanted, const PlayRequest& request, const Player& player, LiveSession& session,
+                      std::uint64_t tick, const Read& read) {
     const auto now = std::chrono::steady_clock::now();
-    if (!input.wants_presses || (player.is_real() && !request.paused)) {
-      presses_.clear();
+    if (!wanted || (player.is_real() && !request.paused)) {
+      value_ = {};
       tick_ = kNever;
     } else if (tick != tick_ && now >= next_ && session.hold(request)) {
-      presses_ = player.presses();
+      value_ = read();
       session.ask(request);
       tick_ = tick;
       const auto end = std::chrono::steady_clock::now();
       next_ = end + std::max<std::chrono::steady_clock::duration>(kEvery, kRest * (end - now));
     }
-    return presses_;
+    return value_;
   }
 
  private:
   static constexpr std::uint64_t kNever = ~std::uint64_t{0};
-  static constexpr std::chrono::milliseconds kEvery{200};  // least time between two updates of the list
+  static constexpr std::chrono::milliseconds kEvery{200};  // least time between two readings
   static constexpr int kRest = 19;  // the session is held for at most one part in 20 of the time
-  std::vector<PairPress> presses_;
-  std::uint64_t tick_ = kNever;  // tick of presses_
+  Value value_{};
+  std::uint64_t tick_ = kNever;  // of value_
   std::chrono::steady_clock::time_point next_{};
 };
 
@@ -52,15 +56,20 @@ struct LiveWindow {
   const ViewCommand& command;
   Window& window;
   ViewFiles files;
-  ViewScript script;
+  std::chrono::steady_clock::time_point began;
+  ViewScript& script;
   SceneReload reload;
   SceneChanger changer;
+  SceneOpener opener;
   ModelDifference difference;
   ChangeComparison comparison{};
   FrameMeter meter{};
   std::string lost{};  // why the window cannot be shown any more; empty: it can
   std::optional<ChangeEffect> effect{};
-  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+  std::unique_ptr<OpenedScene> opened{};  // the scene in which the window goes on
+  std::vector<OfferedScene> recent = recent_scenes(), shipped = shipped_scenes();
+  ThreadRates rates{};
+  std::vector<MapBox> boxes{};
 };
 
 SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) {
@@ -68,11 +77,36 @@ SessionNotes notes_of(const LiveWindow& live, const Player& player, double t_s) 
   notes.building = live.changer.building();
   notes.comparing = live.difference.in_words();
   if (!notes.building.empty()) notes.message = notes.building + "; the session goes on meanwhile";
+  notes.recent = live.recent;
+  notes.shipped = live.shipped;
+  notes.rates = live.rates.rates();
+  notes.boxes = live.boxes;
+  if (live.opener.loading()) notes.message = "opening the scene; the session goes on meanwhile";
   if (live.reload.loading()) notes.message = "loading the scene again; the session goes on meanwhile";
   PastView::add_notes(player, t_s, notes);
   if (!live.reload.error().empty())
     notes.error = live.reload.error() + "\nThe session goes on with the scene as it was.";
   return notes;
+}
+
+// Opens the files that the user dropped or chose: a scene in place of this one, a mesh within it.
+void open_files(LiveWindow& live, const Player& player, const std::vector<std::filesystem::path>& files) {
+  for (const std::filesystem::path& file : files) {
+    const DroppedKind kind = kind_of_file(file);
+    if (kind == DroppedKind::volume || kind == DroppedKind::other) {
+      live.files.say_error(why_not_opened(file));
+    } else if (player.is_real()) {
+      live.files.say_error(
+          "With a real device the scene stays as it is while it is felt. Close the window first.");
+    } else if (kind == DroppedKind::scene) {
+      live.opener.ask(file);
+    } else {
+      live.changer.add_mesh(file);
+    }
+  }
+  live.opened = live.opener.poll();
+  if (const std::string error = live.opener.take_error(); !error.empty())
+    live.files.say_error(error + "\nThe session goes on with the scene as it was.");
 }
 
 // The session goes on in the changed scene once that scene is built. Returns true if the scene was changed.
@@ -88,7 +122,7 @@ bool take_changed_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& viewed, 
     live.effect = show_changed(live.window, viewed, std::move(next), std::move(made), live.comparison);
     return true;
   } catch (const std::exception& e) {
-    live.files.say(std::string("The scene is as it was: ") + e.what());
+    live.files.say_error(std::string("The scene is as it was: ") + e.what());
     return false;
   }
 }
@@ -121,14 +155,16 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
   LiveSession session(*viewed->player, box);
   Player& player = *viewed->player;
   Snapshot shown;
-  PressWatch watch;
+  HeldWatch<std::vector<PairPress>> presses;
+  HeldWatch<std::vector<MapBox>> boxes;
   PastView past;
   RestWish rest;
   auto keep_next = std::chrono::steady_clock::now();
   bool open = true;
-  while (open && !session.ended() && next == nullptr) {
+  std::uint64_t at_rest = 0;  // forces at rest that were found
+  while (open && !session.ended() && next == nullptr && live.opened == nullptr) {
     live.meter.begin(session.processor_time_s());
-    live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.start).count(),
+    live.script.play(std::chrono::duration<double>(std::chrono::steady_clock::now() - live.began).count(),
                      live.window);
     const WindowInput input = live.window.take_input();
     PlayRequest request = request_of(input);
@@ -141,7 +177,8 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
     if (take_changed_scene(live, viewed, session, request)) {
       live.difference.forget();
       request.asked = nullptr;
-      watch = {};
+      presses = {};
+      boxes = {};
     }
     rest.follow(input.compares_with_rest, player, live.files,
                 [&](const auto& change) { session.between_ticks(request, change); });
@@ -157,11 +194,20 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
     session.ask(request);
     if (!shows_past) keep_state(session, request, player, shown.t_s, keep_next);
     session.shown(viewed->drawn, shown);
-    shown.presses = watch.presses(input, request, player, session, shown.tick);
+    shown.presses = presses.follow(input.wants_presses, request, player, session, shown.tick,
+                                   [&] { return player.presses(); });
+    live.boxes = boxes.follow(input.wants_boxes, request, player, session, shown.tick,
+                              [&] { return map_boxes(*viewed->built.world, player.state()); });
     if (input.comparison) live.difference.ask(*input.comparison, *viewed, shown);
     shown.difference = live.difference.found();
     say_error(live.difference, live.files);
-    live.window.add_ticks(player.samples(), player.at_rest());
+    at_rest += live.window.add_ticks(player.samples(), player.at_rest());
+    live.rates.add({.ticks = shown.tick,
+                    .answers_at_rest = at_rest,
+                    .servo_s = session.servo_s(),
+                    .relaxation_s = session.relaxation_s(),
+                    .has_tissue = has_soft(viewed->drawn),
+                    .compares_with_rest = input.compares_with_rest});
     try {
       open =
           live.window.frame(shows_past ? past.snapshot(player, *back, request.asked.get(), shown.difference)
@@ -172,6 +218,7 @@ device::ServoReport play_scene(LiveWindow& live, std::unique_ptr<ViewedScene>& v
       break;
     }
     live.files.save_what_was_asked(live.window, input, *viewed, shown, [&] { return session.hold(request); });
+    open_files(live, player, input.opened);
     if (input.reload) live.reload.ask();
     if (!player.is_real()) next = live.reload.poll();
     live.meter.end(session.processor_time_s());
@@ -185,6 +232,13 @@ device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> v
   for (;;) {
     std::unique_ptr<ViewedScene> next;
     device::ServoReport report = play_scene(live, viewed, box, next);
+    if (live.opened != nullptr) {  // before the old scene is dropped
+      live.changer.cancel();
+      live.difference.forget();
+      live.window.show_scene(live.opened->viewed->drawn);
+      live.window.act({.verb = ViewVerb::look, .text = "all"});
+      return report;
+    }
     if (next == nullptr) {
       if (!live.files.save_at_end(*viewed)) report.messages.emplace_back("the session was not recorded");
       return report;
@@ -201,23 +255,26 @@ device::ServoReport play_scenes(LiveWindow& live, std::unique_ptr<ViewedScene> v
 
 }  // namespace
 
-int play_live(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
-              ViewScript script) {
+LiveEnd play_live(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
+                  ViewScript& script, std::chrono::steady_clock::time_point began) {
   const auto kept = open_black_box_file({}, command.scene, true, viewed->scene.rate_hz);
   LiveWindow live{command,
                   window,
                   ViewFiles(command),
-                  std::move(script),
+                  began,
+                  script,
                   SceneReload(command, viewed->text),
                   SceneChanger(command),
+                  SceneOpener(command),
                   ModelDifference(command, true)};
   const device::ServoReport report = play_scenes(live, std::move(viewed), kept->box());
   fmt::print("{}\n", live.meter.in_words());
   if (!live.lost.empty()) fmt::print(stderr, "the session ended: {}\n", live.lost);
   print_fault(*kept);
   for (const std::string& message : report.messages) std::fprintf(stderr, "device: %s\n", message.c_str());
-  if (report.end == device::ServoEnd::stopped) return exit_status_of_signal(device::stop_signal());
-  return report.end == device::ServoEnd::lost || !live.lost.empty() ? 1 : 0;
+  if (report.end == device::ServoEnd::stopped) return {exit_status_of_signal(device::stop_signal())};
+  if (report.end == device::ServoEnd::lost || !live.lost.empty()) return {1};
+  return {0, std::move(live.opened)};
 }
 
 }  // namespace hybrid

@@ -3,14 +3,16 @@
 // (view_live.cpp). Both play one session, change its scene, and show its kept states.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "hybrid/program/commands.h"
-#include "hybrid/program/model_difference.h"
+#include "hybrid/program/view/model_difference.h"
+#include "hybrid/program/view/open_scene.h"
+#include "hybrid/program/view/viewed_scene.h"
 #include "hybrid/program/view_files.h"
-#include "hybrid/program/viewed_scene.h"
 #include "hybrid/window/view_script.h"
 #include "hybrid/window/window.h"
 
@@ -20,9 +22,16 @@ namespace hybrid {
 // exit status.
 [[nodiscard]] int play_frames(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
                               ViewScript& script);
-// Plays the session in a window until it is closed. Returns the exit status.
-[[nodiscard]] int play_live(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed, Window& window,
-                            ViewScript script);
+// How a live session ended: with another scene, which the window shows already, or with the exit status.
+struct LiveEnd {
+  int status = 0;
+  std::unique_ptr<OpenedScene> next{};
+};
+// Plays the session in a window until it is closed or the user opens another scene. `began`: when the window
+// opened; times of the script count from then.
+[[nodiscard]] LiveEnd play_live(const ViewCommand& command, std::unique_ptr<ViewedScene> viewed,
+                                Window& window, ViewScript& script,
+                                std::chrono::steady_clock::time_point began);
 
 // Converts the window's input to a request for the session.
 [[nodiscard]] PlayRequest request_of(const WindowInput& input);

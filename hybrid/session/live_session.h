@@ -85,9 +85,9 @@ class LiveSession {
   }
   [[nodiscard]] bool ended() const { return ended_; }
   // Processor time of the servo thread and of the relaxation thread so far (s).
-  [[nodiscard]] double processor_time_s() {
-    return relaxation_->busy_s() + (ended_ ? 0.0 : thread_time_s(thread_.native_handle()));
-  }
+  [[nodiscard]] double processor_time_s() { return relaxation_s() + servo_s(); }
+  [[nodiscard]] double relaxation_s() const { return relaxation_->busy_s(); }
+  [[nodiscard]] double servo_s() { return ended_ ? 0.0 : thread_time_s(thread_.native_handle()); }
   device::ServoReport stop() {
     stop_ = true;
     if (thread_.joinable()) thread_.join();

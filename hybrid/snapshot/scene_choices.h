@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Changes of a scene that need a new world: the model, energy and spacing of an object, Young's modulus of a
-// material, the place of an object. The new world is built while the session goes on. Then the session goes
-// on in the new world.
+// Changes of a scene that need a new world: the model, energy and spacing of an object, the elasticity and
+// limits of a material, the place of an object, the size of the tool. The new world is built while the
+// session goes on. Then the session goes on in the new world.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,16 @@ namespace hybrid {
 // One change. The object or the material has this name in the scene.
 struct SceneChange {
   enum class Key : std::uint8_t {
-    model,    // x: 1 as rigid, through the proxy; 0 by its voxels
-    energy,   // x: 1 trilinear, 0 six-link
-    spacing,  // x: the finest spacing of the three axes (m); their ratios stay
-    young,    // x: Pa, of the material `name`
-    move,     // displacement of the object in the scene's frame (m)
+    model,     // x: 1 as rigid, through the proxy; 0 by its voxels
+    energy,    // x: 1 trilinear, 0 six-link
+    spacing,   // x: the finest spacing of the three axes (m); their ratios stay
+    young,     // x: Pa, of the material `name`, as the next four
+    poisson,   // x: Poisson's ratio
+    shortest,  // x: least length of a link (unit: its rest length)
+    longest,   // x: greatest length of a link (unit: its rest length)
+    shear,     // x: greatest slip of a link's ends (unit: its rest length)
+    move,      // displacement of the object in the scene's frame (m)
+    radius,    // x: m, of the tool; without a name
   };
   Key key = Key::model;
   std::string name{};
@@ -33,8 +38,16 @@ struct SpacingChoice {
 
 struct MaterialChoice {
   std::string name{};
-  double young_Pa = 0.0;
-  std::string shared_with{};  // other objects of this material; empty: none
+  double young_Pa = 0.0, poisson = 0.0;
+  double shortest = 0.0, longest = 0.0, shear = 0.0;  // limits of links, as SceneChange::value
+  std::string shared_with{};                          // other objects of this material; empty: none
+};
+
+// The radius of the tool, which may be changed as objects are.
+struct ToolChoices {
+  bool open = false;
+  double radius_m = 0.0;  // 0: a point
+  std::string note{};     // why it cannot be changed; may be empty
 };
 
 // The changes that one object allows.

@@ -77,6 +77,7 @@ struct DrawnScene {
   double tool_radius_m = 0.0;
   double max_force_N = 0.0;  // scale of the force arrow
   std::vector<EditableValue> editable{};
+  ToolChoices tool_choices{};
   std::vector<glm::dvec3> path_m{};  // places of the hand on its path, for the first view; may be empty
 };
 

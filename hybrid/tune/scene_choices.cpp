@@ -70,7 +70,14 @@ void add_materials(const Scene& scene, const SoftDescription& soft, ObjectChoice
     if (found == scene.materials.end()) {
       choices.note += std::string(choices.note.empty() ? "" : "; ") + "its material has no name in the scene";
     } else {
-      choices.materials.push_back({name, found->second.young_Pa, shared_with(scene, name, soft.name)});
+      const Material& material = found->second;
+      choices.materials.push_back({.name = name,
+                                   .young_Pa = material.young_Pa,
+                                   .poisson = material.poisson,
+                                   .shortest = material.stretch_min,
+                                   .longest = material.stretch_max,
+                                   .shear = material.shear,
+                                   .shared_with = shared_with(scene, name, soft.name)});
     }
   }
 }
@@ -140,6 +147,31 @@ void change_tissue(SceneTextEditor& editor, const Scene& as_read, const SceneCha
   }
 }
 
+// The limits of a material's length are one key with two numbers.
+void change_material(SceneTextEditor& editor, const Scene& as_read, const SceneChange& change) {
+  const TextTable table{"material", "", change.name};
+  const auto named = as_read.materials.find(change.name);
+  const Material before = named != as_read.materials.end() ? named->second : Material{};
+  const double x = change.value.x;
+  switch (change.key) {
+    case Key::young:
+      return set(editor, table, "young", number(x));
+    case Key::poisson:
+      return set(editor, table, "poisson", number(x));
+    case Key::shear:
+      return set(editor, table, "shear", number(x));
+    default:
+      return set(editor, table, "stretch",
+                 fmt::format("[{}, {}]", number(change.key == Key::shortest ? x : before.stretch_min),
+                             number(change.key == Key::longest ? x : before.stretch_max)));
+  }
+}
+
+bool is_of_material(Key key) {
+  return key == Key::young || key == Key::poisson || key == Key::shortest || key == Key::longest ||
+         key == Key::shear;
+}
+
 void move(SceneTextEditor& editor, const Scene& as_read, const SceneChange& change) {
   const auto move_in = [&](const auto& objects, const char* list) {
     for (const auto& object : objects) {
@@ -166,6 +198,7 @@ void add_choices(const Scene& as_read, DrawnScene& drawn) {
       if (object.name == name) object.choices = choices_of(as_read, changeable, *soft);
     }
   }
+  drawn.tool_choices = {.open = why_fixed.empty(), .radius_m = as_read.tool.radius_m, .note = why_fixed};
   for (DrawnObject& object : drawn.objects) {
     object.choices.open = why_fixed.empty();
     if (!why_fixed.empty()) object.choices.note = why_fixed;
@@ -177,8 +210,10 @@ std::string changed_text(const std::string& text, const std::filesystem::path& f
   SceneTextEditor editor(text, file);
   for (const SceneChange& change : changes) {
     const Scene as_read = read_scene_text(editor.text(), file);
-    if (change.key == Key::young) {
-      set(editor, {"material", "", change.name}, "young", number(change.value.x));
+    if (is_of_material(change.key)) {
+      change_material(editor, as_read, change);
+    } else if (change.key == Key::radius) {
+      set(editor, {"tool"}, "radius", number(change.value.x / as_read.unit_m));
     } else if (change.key == Key::move) {
       move(editor, as_read, change);
     } else {
@@ -186,6 +221,31 @@ std::string changed_text(const std::string& text, const std::filesystem::path& f
     }
   }
   return editor.text();
+}
+
+std::string text_with_mesh(const std::string& text, const std::filesystem::path& file,
+                           const std::filesystem::path& mesh) {
+  const Scene as_read = read_scene_text(text, file);
+  const auto is_taken = [&](const std::string& name) {
+    return std::ranges::find(as_read.rigid, name, &RigidDescription::name) != as_read.rigid.end() ||
+           std::ranges::find(as_read.soft, name, &SoftDescription::name) != as_read.soft.end();
+  };
+  const auto quoted = [](const std::string& words) {
+    std::string out = "\"";
+    for (const char c : words) {
+      if (static_cast<unsigned char>(c) < 0x20)
+        throw std::runtime_error("the name of the file has control characters");
+      if (c == '"' || c == '\\') out += '\\';
+      out += c;
+    }
+    return out + "\"";
+  };
+  std::filesystem::path stem = mesh.stem();
+  if (!stem.extension().empty() && mesh.extension() == ".gz") stem = stem.stem();
+  std::string name = stem.string();
+  for (int n = 2; is_taken(name); ++n) name = stem.string() + " " + std::to_string(n);
+  return text + (text.ends_with('\n') ? "" : "\n") + "\n[[rigid]]\nname = " + quoted(name) +
+         "\nmesh = " + quoted(std::filesystem::absolute(mesh).string()) + "\n";
 }
 
 std::string in_words(const SceneChange& change) {
@@ -200,6 +260,16 @@ std::string in_words(const SceneChange& change) {
       return change.name + ": voxels of " + mm(x) + " mm";
     case Key::young:
       return change.name + ": " + with_digits(1e-3 * x, 3) + " kPa";
+    case Key::poisson:
+      return change.name + ": Poisson's ratio " + with_digits(x, 3);
+    case Key::shortest:
+      return change.name + ": links at least " + with_digits(x, 3) + " of their length";
+    case Key::longest:
+      return change.name + ": links at most " + with_digits(x, 3) + " of their length";
+    case Key::shear:
+      return change.name + ": links slip by at most " + with_digits(x, 3);
+    case Key::radius:
+      return "tool: radius " + mm(x) + " mm";
     case Key::move:
       return change.name + ": moved by " + mm(x) + ", " + mm(change.value.y) + ", " + mm(change.value.z) +
              " mm";

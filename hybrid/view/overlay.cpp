@@ -92,7 +92,7 @@ OverlayMesh Overlay::build(const DrawnScene& scene, const Snapshot& snapshot, co
   }
   draw_slice_frames(pen, content);
   draw_heading(pen, scene, snapshot, content);
-  draw_scale_bar(pen, content.camera, view);
+  if (shows_a_session(scene)) draw_scale_bar(pen, content.camera, view);
   if (content.panel != nullptr) {
     content.panel->draw(pen, scene, snapshot, content.layout.column);
     draw_colour_key(pen, scene, content);

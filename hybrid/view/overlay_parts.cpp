@@ -16,6 +16,10 @@ constexpr float kHairline = 1.0F;  // pixels; thin, so that it covers little of 
 
 }  // namespace
 
+bool shows_a_session(const DrawnScene& scene) {
+  return !scene.objects.empty() || scene.tool_radius_m > 0.0;
+}
+
 void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                   const OverlayContent& content) {
   const float em = pen.em;
@@ -25,6 +29,7 @@ void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   // The title's font is twice as large as the body's, with which fit() measures.
   title = pen.fit(title, (static_cast<float>(content.width) - 2.0F * em) / 2.0F);
   pen.text(x, y, pen.inks.text, title, true);
+  if (!shows_a_session(scene)) return;
   y += 2.2F * em;
   pen.text(x, y, pen.inks.text,
            "time " + with_decimals(snapshot.t_s, 3) + " s    force on the hand " +

@@ -8,6 +8,9 @@
 
 namespace hybrid {
 
+// Is there anything to feel? A window that offers scenes shows none.
+[[nodiscard]] bool shows_a_session(const DrawnScene& scene);
+
 void draw_heading(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                   const OverlayContent& content);
 // Draws a bar of a round length. The length holds at the depth of the view's target.

@@ -21,6 +21,10 @@ inline constexpr glm::vec3 dark_tool{0.66F, 0.71F, 0.79F};  // on the dark backg
 inline constexpr glm::vec3 device{0.10F, 0.45F, 0.85F};
 inline constexpr glm::vec3 force{0.03F, 0.38F, 0.93F};
 
+// Edges of triangles, on any surface.
+inline constexpr glm::vec3 wire{0.10F, 0.12F, 0.16F};
+inline constexpr glm::vec3 dark_wire{0.86F, 0.89F, 0.94F};
+
 // Axes of the scene, x first (Okabe & Ito 2008).
 inline constexpr std::array<glm::vec3, 3> axes{
     {{0.835F, 0.369F, 0.0F}, {0.0F, 0.55F, 0.40F}, {0.0F, 0.447F, 0.698F}}};

@@ -35,7 +35,7 @@ void Renderer::State::draw_part(const PixelRect& of_view) {
 void Renderer::State::draw_rigid_layer(RigidLayer& rigid) {
   LayerKey key{.clip = clip, .clip_plane = clip_equation(view.clip, bounds, origin_m).value_or(kKeepAll)};
   for (std::size_t i = 0; i < meshes->all().size(); ++i) {
-    if (is_opaque(i, false)) key.drawn.emplace_back(i, meshes->all()[i].placed);
+    if (is_opaque_rigid(i)) key.drawn.emplace_back(i, meshes->all()[i].placed);
   }
   const bool fresh = rigid.layer.set_size(pixels.width, pixels.height);
   if (!fresh && key == rigid.key) return;
@@ -241,6 +241,7 @@ void Renderer::State::draw_view(const DrawnScene& scene, const Snapshot& snapsho
   }
   glDisable(GL_CULL_FACE);
   draw_translucent();
+  draw_wires();
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "hybrid/view/gl/gl_objects.h"
 #include "hybrid/view/gl/rigid_layer.h"
@@ -89,18 +90,24 @@ struct Renderer::State {
     uniform("scene_from_mesh", scene_from_mesh);
     uniform("normal_from_mesh", normal);
   }
-  [[nodiscard]] ObjectLook look_of(std::size_t object) const;
-  [[nodiscard]] bool is_opaque(std::size_t object, bool soft) const {
-    const ObjectLook look = look_of(object);
-    return meshes->all()[object].soft == soft && look.visible && look.opacity >= 1.0F;
+  [[nodiscard]] bool is_opaque_rigid(std::size_t object) const {
+    return !meshes->all()[object].soft && view.look_of(object).is_opaque();
   }
+  // The surfaces to draw: of objects, or of the materials of an object.
+  struct Shown {
+    const SceneMesh* mesh;
+    Look look;
+  };
+  [[nodiscard]] std::vector<Shown> shown_surfaces() const;
   void copy_depth(const RenderedView& to) const;
   void draw_part(const PixelRect& of_view);
   void draw_view(const DrawnScene& scene, const Snapshot& snapshot, const Camera& camera, RenderedView& to);
   void draw_rigid(Shading shading);
   void draw_soft();
   void draw_object(const SceneMesh& object, float alpha, const ValueRange& values = {}) const;
+  void draw_triangles(const SceneMesh& object, float margin, const ValueRange& values) const;
   void draw_tissue(const SceneMesh& object, float alpha);
+  void draw_wires();
   void draw_section(const GlSection& section);
   [[nodiscard]] Projection projection() const { return {clip, right, up, glm::cross(right, up), pixels}; }
   [[nodiscard]] ShownTool shown_tool(const DrawnScene& scene, const Snapshot& snapshot,

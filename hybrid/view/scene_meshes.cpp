@@ -63,7 +63,7 @@ void GlSection::release() {
 }
 
 SceneMeshes::SceneMeshes(const DrawnScene& scene, const glm::dvec3& origin_m, bool light_vertices)
-    : origin_m_(origin_m), meshes_(scene.objects.size()) {
+    : origin_m_(origin_m), light_vertices_(light_vertices), meshes_(scene.objects.size()) {
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const DrawnObject& object = scene.objects[i];
     SceneMesh& own = meshes_[i];
@@ -112,6 +112,37 @@ void SceneMeshes::move_surface(SceneMesh& mesh, const std::vector<glm::dvec3>& a
   mesh.mesh.stream(mesh.moving);
 }
 
+void SceneMeshes::move_materials(SceneMesh& mesh, const DrawnScene& scene, std::size_t object,
+                                 const std::vector<MaterialSurface>& surfaces) const {
+  for (std::size_t s = surfaces.size(); s < mesh.materials.size(); ++s) mesh.materials[s].mesh.release();
+  mesh.materials.resize(surfaces.size());
+  for (std::size_t s = 0; s < surfaces.size(); ++s) {
+    const MaterialSurface& surface = surfaces[s];
+    SceneMesh& own = mesh.materials[s];
+    if (own.shape_number != surface.shape_number) {
+      if (own.mesh.count > 0) own.mesh.release();
+      own = {};
+      own.soft = own.closed = true;
+      own.material = scene.objects[object].inside.materials[surface.material];
+      own.colour = palette::of_inside(scene, object)[surface.material];
+      own.bounds = bounds_of({.vertices = surface.at_rest_m, .triangles = {}});
+      own.moving = surface.mesh;
+      own.lit_by_vertex = light_vertices_ && own.moving.indices.size() / 3 > kLitByVertex;
+      std::vector<MeshPart> parts = divide_mesh(own.moving);
+      own.mesh.upload(own.moving, true);
+      own.mesh.parts = std::move(parts);
+    } else if (own.moved_number == surface.moved_number) {
+      continue;
+    }
+    own.moving.vertices = surface.mesh.vertices;
+    own.most_moved_m = surface.most_moved_m;
+    update_parts(own.moving, own.mesh.parts);
+    own.mesh.stream(own.moving);
+    own.shape_number = surface.shape_number;
+    own.moved_number = surface.moved_number;
+  }
+}
+
 void SceneMeshes::move(const DrawnScene& scene, const Snapshot& snapshot, const TissueView& tissue) {
   for (std::size_t i = 0; i < meshes_.size(); ++i) {
     SceneMesh& mesh = meshes_[i];
@@ -120,6 +151,7 @@ void SceneMeshes::move(const DrawnScene& scene, const Snapshot& snapshot, const 
     if (!mesh.soft || i >= scene.objects.size()) continue;
     if (i < snapshot.soft_moved_m.size())
       move_surface(mesh, scene.objects[i].surface.vertices, snapshot.soft_moved_m[i], tissue, i);
+    move_materials(mesh, scene, i, tissue.materials(i));
     const std::vector<TissueSlice>& slices = tissue.slices(i);
     for (std::size_t s = slices.size(); s < mesh.slices.size(); ++s) mesh.slices[s].release();
     mesh.slices.resize(slices.size());
@@ -146,7 +178,7 @@ void SceneMeshes::cut(const DrawnScene& scene, const Snapshot& snapshot, const C
   for (std::size_t i = 0; i < meshes_.size(); ++i) {
     SceneMesh& mesh = meshes_[i];
     mesh.face.release();
-    const auto cut = mesh.soft && view.look_of(i).visible && !view.sliced()
+    const auto cut = mesh.soft && view.look_of(i).visible && !view.sliced() && !view.separates_materials(i)
                          ? choose_cut(scene, snapshot, camera, i)
                          : std::nullopt;
     if (!cut) continue;
@@ -181,6 +213,7 @@ void SceneMeshes::release() {
   for (SceneMesh& mesh : meshes_) {
     mesh.mesh.release();
     mesh.face.release();
+    for (SceneMesh& material : mesh.materials) material.mesh.release();
     for (GlSection& slice : mesh.slices) slice.release();
   }
 }

@@ -63,6 +63,11 @@ struct SceneMesh {
   std::vector<glm::vec3> moved_m;
   std::uint64_t values_number = 0;
   std::vector<PartMove> moves;  // [part] since the frame before; empty: none
+
+  // ---- soft objects whose materials have looks of their own: a mesh for each visible material ----
+  std::vector<SceneMesh> materials;
+  std::string material{};                            // of one of `materials`: its name
+  std::uint64_t shape_number = 0, moved_number = 0;  // the same: as uploaded; of MaterialSurface
 };
 
 class SceneMeshes {
@@ -83,10 +88,13 @@ class SceneMeshes {
   [[nodiscard]] const std::vector<SceneMesh>& all() const { return meshes_; }
 
  private:
+  void move_materials(SceneMesh& mesh, const DrawnScene& scene, std::size_t object,
+                      const std::vector<MaterialSurface>& surfaces) const;
   void move_surface(SceneMesh& mesh, const std::vector<glm::dvec3>& at_rest,
                     const std::vector<glm::vec3>& moved_m, const TissueView& tissue, std::size_t object);
 
   glm::dvec3 origin_m_;
+  bool light_vertices_;
   std::vector<SceneMesh> meshes_;  // [object]
 };
 

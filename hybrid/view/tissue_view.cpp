@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "hybrid/view/palette.h"
+#include "hybrid/view/tissue/material_surface.h"
 
 namespace hybrid {
 namespace {
@@ -46,6 +47,13 @@ std::uint64_t number_of(const ViewSettings& view) {
   };
   add(needs_field(view.colour) ? 1 : 0);
   for (const SlicePlane& slice : view.slices) add(slice.on ? std::bit_cast<std::uint64_t>(slice.share) : 1);
+  for (std::size_t o = 0; o < view.material_looks.size(); ++o) {
+    if (!view.separates_materials(o)) continue;
+    add(o);
+    for (const auto& [name, look] : view.material_looks[o]) {
+      if (!look.shows()) add(std::hash<std::string>{}(name));
+    }
+  }
   return std::max<std::uint64_t>(hash, 1);
 }
 
@@ -61,6 +69,7 @@ TissueView::TissueView(const DrawnScene& scene, const glm::dvec3& origin_m)
 void TissueView::set(const ViewSettings& view) {
   const bool planes = fresh_ || view.slices != view_.slices;
   const bool field = fresh_ || needs_field(view.colour) != needs_field(view_.colour);
+  const bool materials = fresh_ || view.material_looks != view_.material_looks;
   const bool colour = view.colour != view_.colour;
   if (differs_ && view.colour != TissueColour::difference) {
     differs_ = false;
@@ -74,10 +83,11 @@ void TissueView::set(const ViewSettings& view) {
   for (std::size_t o = 0; o < objects_.size(); ++o) {
     if (!scene_.objects[o].soft) continue;
     if (planes) make_slices(o);
-    if (planes || field) make_fields(o, field, true);
+    if (materials) make_materials(o);
+    if (planes || field || materials) make_fields(o, field);
     paint(o);
   }
-  if (planes || field) {
+  if (planes || field || materials) {
     ask();
   } else if (colour) {
     for (std::size_t o = 0; o < objects_.size(); ++o) {
@@ -104,7 +114,25 @@ void TissueView::make_slices(std::size_t o) {
   }
 }
 
-void TissueView::make_fields(std::size_t o, bool surface, bool slices) {
+void TissueView::make_materials(std::size_t o) {
+  Object& object = objects_[o];
+  object.materials.clear();
+  if (!view_.separates_materials(o)) return;
+  const DrawnInside& inside = scene_.objects[o].inside;
+  object.made.resize(inside.materials.size());
+  for (std::size_t m = 0; m < inside.materials.size(); ++m) {
+    if (!view_.material_look_of(o, inside.materials[m]).shows()) continue;
+    if (!object.made[m]) object.made[m] = surface_of_material(inside, m);
+    if (object.made[m]->triangles.empty()) continue;
+    MaterialSurface surface{.material = m, .at_rest_m = object.made[m]->vertices, .mesh = {}};
+    surface.mesh = make_moving_mesh(*object.made[m], origin_m_);
+    surface.shape_number = surface.moved_number = ++number_;
+    object.materials.push_back(std::move(surface));
+  }
+}
+
+// `surface`: the field of the object's surface, too.
+void TissueView::make_fields(std::size_t o, bool surface) {
   Object& object = objects_[o];
   const DrawnObject& drawn = scene_.objects[o];
   const bool wanted = needs_field(view_.colour);
@@ -114,10 +142,12 @@ void TissueView::make_fields(std::size_t o, bool surface, bool slices) {
     object.values_number = ++number_;
     if (wanted) object.surface.emplace(drawn.inside, drawn.surface.vertices);
   }
-  if (!slices) return;
   object.nets.assign(object.slices.size(), {});
   for (std::size_t s = 0; wanted && s < object.slices.size(); ++s)
     object.nets[s].emplace(drawn.inside, object.slices[s].section.in_tissue);
+  object.material_fields.assign(object.materials.size(), {});
+  for (std::size_t m = 0; wanted && m < object.materials.size(); ++m)
+    object.material_fields[m].emplace(drawn.inside, object.materials[m].at_rest_m);
 }
 
 // With view_.grey, slices show the scan as soon as it has been read. Otherwise they show materials.
@@ -151,6 +181,10 @@ void TissueView::ask() {
     for (std::size_t s = 0; s < object.slices.size(); ++s) {
       add(object.slices[s].section.in_tissue);
       if (object.nets[s]) add(object.nets[s]->points_m());
+    }
+    for (std::size_t m = 0; m < object.materials.size(); ++m) {
+      add(object.materials[m].at_rest_m);
+      if (object.material_fields[m]) add(object.material_fields[m]->points_m());
     }
     any = any || !points.empty();
   }
@@ -192,20 +226,40 @@ void TissueView::take(std::size_t o, const std::vector<glm::vec3>& moved_m) {
   for (std::size_t s = 0; s < object.slices.size(); ++s) {
     TissueSlice& slice = object.slices[s];
     const std::span<const glm::vec3> nodes = next(slice.section.in_tissue.size());
-    std::vector<float> values;
-    if (object.nets[s]) {
-      values = object.nets[s]->values(view_.colour, next(object.nets[s]->points_m().size()));
-    } else {
-      const bool differs = view_.colour == TissueColour::difference;  // known on surfaces alone
-      for (const glm::vec3& by : nodes) values.push_back(differs ? 0.0F : glm::length(by));
-    }
-    if (view_.colour == TissueColour::strain) raise_end(most_strain_, kLeastStrain, kNoStrain, values);
-    if (view_.colour == TissueColour::displacement) {
-      for (const float value : values) note_moved(value);
-    }
+    const auto at_field = object.nets[s] ? next(object.nets[s]->points_m().size()) : all.first(0);
+    const std::vector<float> values = values_within(object.nets[s], nodes, at_field);
     slice.mesh = move_section(slice.section, nodes, values, false, origin_m_);
     slice.moved_number = ++number_;
   }
+  for (std::size_t m = 0; m < object.materials.size(); ++m) {
+    MaterialSurface& surface = object.materials[m];
+    const std::optional<TissueField>& field = object.material_fields[m];
+    const std::span<const glm::vec3> by = next(surface.at_rest_m.size());
+    const std::vector<float> values =
+        values_within(field, by, field ? next(field->points_m().size()) : all.first(0));
+    surface.most_moved_m = move_vertices(surface.mesh, surface.at_rest_m, by, origin_m_);
+    for (std::size_t v = 0; v < values.size(); ++v) surface.mesh.vertices[v].value = values[v];
+    surface.moved_number = ++number_;
+  }
+}
+
+// The values at places within the tissue, and raises the end of their scale. Without a field they are
+// displacements. A difference of models is known on the surfaces of whole objects alone, so it is 0 there.
+std::vector<float> TissueView::values_within(const std::optional<TissueField>& field,
+                                             std::span<const glm::vec3> at_places,
+                                             std::span<const glm::vec3> at_field) {
+  std::vector<float> values;
+  if (field) {
+    values = field->values(view_.colour, at_field);
+  } else {
+    const bool differs = view_.colour == TissueColour::difference;
+    for (const glm::vec3& by : at_places) values.push_back(differs ? 0.0F : glm::length(by));
+  }
+  if (view_.colour == TissueColour::strain) raise_end(most_strain_, kLeastStrain, kNoStrain, values);
+  if (view_.colour == TissueColour::displacement) {
+    for (const float value : values) note_moved(value);
+  }
+  return values;
 }
 
 void TissueView::note_moved(float moved_m) {

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,6 +36,15 @@ struct TissueSlice {
   std::uint64_t shape_number = 0, moved_number = 0;  // rise when the net, its places or values change
 };
 
+// The surface of one material, in an object whose materials have looks of their own.
+struct MaterialSurface {
+  std::size_t material = 0;                          // index in DrawnInside::materials
+  std::vector<glm::dvec3> at_rest_m;                 // [vertex] scene frame
+  DrawMesh mesh;                                     // relative to the view's origin
+  float most_moved_m = 0.0F;                         // of a vertex
+  std::uint64_t shape_number = 0, moved_number = 0;  // as of TissueSlice
+};
+
 class TissueView {
  public:
   // Keeps a reference to the scene. `origin_m`: of the meshes.
@@ -48,6 +59,10 @@ class TissueView {
 
   [[nodiscard]] const std::vector<TissueSlice>& slices(std::size_t object) const {
     return objects_[object].slices;
+  }
+  // The surfaces of the visible materials. Empty: the object is drawn as a whole.
+  [[nodiscard]] const std::vector<MaterialSurface>& materials(std::size_t object) const {
+    return objects_[object].materials;
   }
   // The value at each vertex of the surface. Empty: its displacement.
   [[nodiscard]] const std::vector<float>& values(std::size_t object) const { return objects_[object].values; }
@@ -69,14 +84,21 @@ class TissueView {
     std::uint64_t values_number = 0;
     std::optional<TissueField> surface;            // for strain and limits
     std::vector<std::optional<TissueField>> nets;  // [slice] as `surface`
-    std::vector<glm::vec3> answer;                 // the displacements that were taken last
-    bool taken = false;                            // `answer` belongs to the present points
+    std::vector<MaterialSurface> materials;
+    std::vector<std::optional<TissueField>> material_fields;  // [one of materials] as `surface`
+    // [material] at rest; empty: not made yet. They are kept, because making one takes longer than a frame.
+    std::vector<std::optional<polygon::TriangleMesh>> made;
+    std::vector<glm::vec3> answer;  // the displacements that were taken last
+    bool taken = false;             // `answer` belongs to the present points
   };
-  void make_fields(std::size_t object, bool surface, bool slices);
+  void make_fields(std::size_t object, bool surface);
   void make_slices(std::size_t object);
+  void make_materials(std::size_t object);
   void paint(std::size_t object);
   void ask();
   void take(std::size_t object, const std::vector<glm::vec3>& moved_m);
+  std::vector<float> values_within(const std::optional<TissueField>& field,
+                                   std::span<const glm::vec3> at_places, std::span<const glm::vec3> at_field);
   void take_difference(const FeltDifference* difference);
   void note_moved(float moved_m);
 

@@ -85,6 +85,8 @@ ViewKey view_key(const SceneMeshes& meshes, const glm::mat4& clip, const ViewSet
   for (const SceneMesh& mesh : meshes.all()) {
     key.placed.push_back(mesh.placed);
     key.cut = key.cut || mesh.face.mesh.count > 0;
+    for (const SceneMesh& material : mesh.materials)
+      key.numbers.insert(key.numbers.end(), {material.shape_number, material.moved_number});
     for (const GlSection& slice : mesh.slices)
       key.numbers.insert(key.numbers.end(), {slice.image_number, slice.shape_number, slice.moved_number});
   }

@@ -37,7 +37,7 @@ struct ViewKey {
   ViewSettings settings;
   ColourScale scale;
   std::vector<glm::mat4> placed{};       // [object]
-  std::vector<std::uint64_t> numbers{};  // of all slices, as in GlSection
+  std::vector<std::uint64_t> numbers{};  // of all slices and materials, as uploaded
   bool cut = false;                      // an object is cut, by a plane that follows the tool
 
   friend bool operator==(const ViewKey&, const ViewKey&) = default;

@@ -8,6 +8,12 @@
 
 namespace hybrid {
 
+Look ViewSettings::material_look_of(std::size_t object, std::string_view material) const {
+  if (object >= material_looks.size()) return {};
+  const auto at = material_looks[object].find(material);
+  return at == material_looks[object].end() ? Look{} : at->second;
+}
+
 double clip_place_m(const ClipPlane& clip, const SceneBounds& bounds) {
   return bounds.centre_m[clip.axis] + (2.0 * std::clamp(clip.share, 0.0, 1.0) - 1.0) * bounds.radius_m;
 }

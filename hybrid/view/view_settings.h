@@ -2,8 +2,12 @@
 // Settings of the view in a window. None of them changes the forces.
 #pragma once
 
+#include <functional>
 #include <glm/vec4.hpp>
+#include <map>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "hybrid/view/camera.h"
@@ -11,11 +15,14 @@
 
 namespace hybrid {
 
-struct ObjectLook {
+// How an object, or one material of a soft object, is drawn.
+struct Look {
   bool visible = true;
   float opacity = 1.0F;  // 0 to 1
 
-  friend bool operator==(const ObjectLook&, const ObjectLook&) = default;
+  [[nodiscard]] bool shows() const { return visible && opacity > 0.0F; }
+  [[nodiscard]] bool is_opaque() const { return visible && opacity >= 1.0F; }
+  friend bool operator==(const Look&, const Look&) = default;
 };
 
 // A plane across the scene, perpendicular to an axis. The part beyond the plane along the axis is left out.
@@ -52,7 +59,11 @@ struct SoftBox {
 [[nodiscard]] bool has_soft(const DrawnScene& scene);
 
 struct ViewSettings {
-  std::vector<ObjectLook> looks;  // [object]; further objects have the default
+  std::vector<Look> looks;  // [object]; further objects have the default
+  // [object] looks of its materials, by name, within the object's look. Materials that are not listed have
+  // the default. If any is listed, the object is drawn as the surfaces of its materials.
+  std::vector<std::map<std::string, Look, std::less<>>> material_looks;
+  bool wires = false;  // edges of all surfaces' triangles
   ClipPlane clip;
   std::array<SlicePlane, 3> slices;  // [axis]
   bool grey = false;                 // slices show the scan's grey values, where there is a scan
@@ -60,8 +71,12 @@ struct ViewSettings {
   bool dark = false;
   bool inset = true;  // a nearer view of the contact
 
-  [[nodiscard]] ObjectLook look_of(std::size_t object) const {
-    return object < looks.size() ? looks[object] : ObjectLook{};
+  [[nodiscard]] Look look_of(std::size_t object) const {
+    return object < looks.size() ? looks[object] : Look{};
+  }
+  [[nodiscard]] Look material_look_of(std::size_t object, std::string_view material) const;
+  [[nodiscard]] bool separates_materials(std::size_t object) const {
+    return object < material_looks.size() && !material_looks[object].empty();
   }
   [[nodiscard]] bool sliced() const { return slices[0].on || slices[1].on || slices[2].on; }
 

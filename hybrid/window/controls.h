@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +18,10 @@ namespace hybrid::controls {
 [[nodiscard]] PixelRect take_place(float height);
 // Writes a label at the left; the next control comes beside it.
 void label_beside(const Pen& pen, const std::string& words);
+// A tick box with a colour and a name, in place of the label.
+void tick_beside(const Pen& pen, const std::string& words, const glm::vec3& colour, bool& on);
+// A square of a colour.
+void swatch(const Pen& pen, const glm::vec3& colour);
 // Writes a label in a line of controls.
 void label(const std::string& words);
 void same_line();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The panel's controls for changes that need a new world: model, energy, spacing, Young's modulus. Also shows
-// the effect of the last change.
+// The panel's controls for changes that need a new world: model, energy, spacing, elasticity and limits of
+// materials, size of the tool. Also shows the effect of the last change.
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <string>
@@ -21,7 +22,11 @@ namespace {
 using Key = SceneChange::Key;
 
 constexpr double kLeastShown_jnd = 0.01;  // smaller differences are those of the equilibrium's tolerance
-constexpr float kUsualFactor = 10.0F;     // a slider goes from a tenth of the modulus to ten times that
+constexpr double kUsualFactor = 10.0;     // sliders go from a tenth of the scene's value to ten times that
+constexpr double kLogarithmic = 50.0;     // a slider whose ends have a larger ratio is logarithmic
+constexpr double kMostPoisson = 0.49;     // tissue above it is as good as incompressible
+// Ends of the sliders of limits (unit: the rest length of a link). A scene's own value may lie beyond them.
+constexpr double kUsualShortest = 0.05, kUsualLongest = 3.0, kUsualSlip = 2.0;
 
 // A list of two choices. Returns true if the user took the other one.
 bool took_other(const Pen& pen, const char* label, const char* id, bool second,
@@ -57,20 +62,81 @@ std::string verdict_on(const std::optional<ComparedForces>& forces) {
 
 }  // namespace
 
-void Panels::draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result) {
-  const auto in_scene = static_cast<float>(1e-3 * material.young_Pa);
-  const bool asked = asked_young_ && asked_young_->material == material.name;
-  float shown = asked ? asked_young_->young_kPa : in_scene;
-  label_beside(pen, pen.fit("E, " + material.name, 8.6F * pen.em));
-  const Slid slid = slide(("##young " + material.name).c_str(), shown, in_scene / kUsualFactor,
-                          in_scene * kUsualFactor, number_format(shown) + " kPa", true);
-  tip("Young's modulus of \"" + material.name + "\"" +
-      (material.shared_with.empty() ? "" : ", also of: " + material.shared_with) +
-      "\nTakes effect when you let go");
-  if (slid.held) asked_young_ = AskedYoung{material.name, shown, kFramesUntilBuilding};
+// A slider of a value whose change needs a new world. It takes effect when the user lets go.
+void Panels::draw_built_value(const Pen& pen, const BuiltValue& value, PanelResult& result) {
+  const auto in_scene = static_cast<float>(value.in_scene / value.unit_SI);
+  const bool asked = asked_value_ && asked_value_->key == value.key && asked_value_->name == value.name;
+  float shown = asked ? asked_value_->shown : in_scene;
+  label_beside(pen, pen.fit(value.label, 8.6F * pen.em));
+  const std::string id = "##" + value.label + value.name;
+  const Slid slid =
+      slide(id.c_str(), shown, static_cast<float>(value.low / value.unit_SI),
+            static_cast<float>(value.high / value.unit_SI), number_format(shown) + value.unit_words,
+            value.low > 0.0 && value.high > kLogarithmic * value.low);
+  tip(value.tip + "\nTakes effect when you let go");
+  if (slid.held) asked_value_ = AskedValue{value.key, value.name, shown, kFramesUntilBuilding};
   if (!slid.let_go) return;
+  const double si = static_cast<double>(shown) * value.unit_SI;
   result.actions.push_back(
-      {.verb = ViewVerb::change, .change = {Key::young, material.name, glm::dvec3(1e3 * shown, 0.0, 0.0)}});
+      {.verb = ViewVerb::change, .change = {value.key, value.name, glm::dvec3(si, 0.0, 0.0)}});
+}
+
+void Panels::forget_asked_value(const PanelFrame& frame) {
+  if (asked_value_ && !frame.notes.building.empty()) asked_value_->frames_left = 1;
+  if (asked_value_ && frame.notes.building.empty() && --asked_value_->frames_left < 0) asked_value_.reset();
+}
+
+void Panels::draw_tool_size(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
+                            PanelResult& result) {
+  const ToolChoices& tool = scene.tool_choices;
+  forget_asked_value(frame);
+  begin_fixed(!tool.open);
+  const double from = tool.radius_m > 0.0 ? tool.radius_m : scene.tool_radius_m;
+  draw_built_value(pen,
+                   {.key = Key::radius,
+                    .label = "radius",
+                    .tip = tool.radius_m > 0.0 ? "Radius of the tool" : "Radius of the tool, now a point",
+                    .in_scene = tool.radius_m,
+                    .low = tool.radius_m > 0.0 ? from / kUsualFactor : 0.0,
+                    .high = from * kUsualFactor,
+                    .unit_SI = 1e-3,
+                    .unit_words = " mm"},
+                   result);
+  end_fixed();
+  if (!tool.note.empty()) write("The radius is " + tool.note, true);
+}
+
+// Poisson's ratio and limits of one material, which the user chooses: there may be many materials.
+void Panels::draw_limits(const Pen& pen, const std::vector<MaterialChoice>& materials, PanelResult& result) {
+  if (materials.empty()) return;
+  auto shown = std::ranges::find(materials, limits_of_, &MaterialChoice::name);
+  if (shown == materials.end()) shown = materials.begin();
+  if (materials.size() > 1) {
+    std::vector<std::string> names;
+    for (const MaterialChoice& material : materials) names.push_back(material.name);
+    label_beside(pen, "limits of");
+    if (const auto taken = choose("##limits of", shown->name, names)) limits_of_ = names[*taken];
+  }
+  const MaterialChoice& m = *shown;
+  const auto row = [&](Key key, const char* label, const char* words, double in_scene, double low,
+                       double high) {
+    draw_built_value(pen,
+                     {.key = key,
+                      .name = m.name,
+                      .label = label,
+                      .tip = std::string(words) + " of \"" + m.name + "\"",
+                      .in_scene = in_scene,
+                      .low = std::min(low, in_scene),
+                      .high = std::max(high, in_scene)},
+                     result);
+  };
+  row(Key::poisson, "Poisson's ratio", "Poisson's ratio", m.poisson, 0.0, kMostPoisson);
+  row(Key::shortest, "shortest link", "Least length of a link, as a share of its rest length,", m.shortest,
+      kUsualShortest, 1.0);
+  row(Key::longest, "longest link", "Greatest length of a link, as a share of its rest length,", m.longest,
+      1.0, kUsualLongest);
+  row(Key::shear, "slip of a link", "Greatest slip across a link, as a share of its rest length,", m.shear,
+      0.0, kUsualSlip);
 }
 
 void Panels::draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
@@ -81,8 +147,7 @@ void Panels::draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFr
     result.actions.push_back(
         {.verb = ViewVerb::change, .change = {key, object.name, glm::dvec3(value, 0.0, 0.0)}});
   };
-  if (asked_young_ && !frame.notes.building.empty()) asked_young_->frames_left = 1;
-  if (asked_young_ && frame.notes.building.empty() && --asked_young_->frames_left < 0) asked_young_.reset();
+  forget_asked_value(frame);
   begin_fixed(!choices.open);
   if (took_other(pen, "felt", "##felt", choices.as_rigid, {"by its voxels", "as rigid"}, choices.other_model))
     ask(Key::model, choices.as_rigid ? 0.0 : 1.0);
@@ -95,7 +160,21 @@ void Panels::draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFr
     for (const SpacingChoice& other : choices.spacings) words.push_back(other.words);
     if (const auto taken = choose("##spacing", choices.spacing_words, words))
       ask(Key::spacing, choices.spacings[*taken].spacing_m);
-    for (const MaterialChoice& material : choices.materials) draw_young(pen, material, result);
+    for (const MaterialChoice& m : choices.materials) {
+      draw_built_value(pen,
+                       {.key = Key::young,
+                        .name = m.name,
+                        .label = "E, " + m.name,
+                        .tip = "Young's modulus of \"" + m.name + "\"" +
+                               (m.shared_with.empty() ? "" : ", also of: " + m.shared_with),
+                        .in_scene = m.young_Pa,
+                        .low = m.young_Pa / kUsualFactor,
+                        .high = m.young_Pa * kUsualFactor,
+                        .unit_SI = 1e3,
+                        .unit_words = " kPa"},
+                       result);
+    }
+    draw_limits(pen, choices.materials, result);
   }
   end_fixed();
   if (!choices.note.empty()) write(choices.note, true);

@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include "hybrid/base/number_text.h"
+#include "hybrid/view/palette.h"
 #include "hybrid/window/panels.h"
 
 namespace hybrid {
@@ -42,6 +43,22 @@ void draw_box(const Pen& pen, const MoveHandles& handles, const Camera& camera, 
 }
 
 }  // namespace
+
+void draw_trail(const Pen& pen, const TickHistory& history, const Camera& camera, const PixelRect& where) {
+  constexpr std::size_t places = 500;
+  const std::vector<glm::dvec3> path = history.path_m(places);
+  std::optional<glm::dvec2> last;
+  for (std::size_t n = 0; n < path.size(); ++n) {
+    const auto pixel = camera.pixel(path[n], where.width, where.height);
+    if (pixel && last) {
+      const float age = 1.0F - static_cast<float>(n) / static_cast<float>(path.size());
+      const glm::vec2 corner(where.x, where.y);
+      pen.line(corner + glm::vec2(*last), corner + glm::vec2(*pixel),
+               ink_of(palette::device, 1.0F - 0.85F * age), 0.14F * pen.em);
+    }
+    last = pixel;
+  }
+}
 
 void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera& camera,
                        const PixelRect& where) {

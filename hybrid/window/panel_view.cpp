@@ -73,10 +73,18 @@ void Panels::draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame
       ask(ViewVerb::clip_place, {static_cast<double>(share)});
   }
   if (!box_.empty) draw_tissue_view(pen, view, result);
-  bool inset = view.inset, dark = view.dark;
+  bool inset = view.inset, dark = view.dark, wires = view.wires;
   if (tick_box("near view", inset)) ask(ViewVerb::inset, {inset ? 1.0 : 0.0});
   same_line();
   if (tick_box("dark", dark)) ask(ViewVerb::dark, {dark ? 1.0 : 0.0});
+  same_line();
+  bool trail = frame.state.trail, map = frame.state.map;
+  if (tick_box("cells, patches (J)", map)) ask(ViewVerb::map, {map ? 1.0 : 0.0});
+  tip("Near the tool: cells of the occupancy map with rigid surfaces (orange) and with tissue (green),\n"
+      "and the boxes on which contacts with tissue are solved (blue)");
+  if (tick_box("hand's path (D)", trail)) ask(ViewVerb::trail, {trail ? 1.0 : 0.0});
+  same_line();
+  if (tick_box("wireframe (U)", wires)) ask(ViewVerb::wires, {wires ? 1.0 : 0.0});
 }
 
 void Panels::draw_tissue_view(const Pen& pen, const ViewSettings& view, PanelResult& result) const {

@@ -107,6 +107,11 @@ bool open_section(const char* name, bool open = true) {
 }  // namespace
 
 namespace controls {
+namespace {
+
+constexpr float kLabel_em = 9.2F;  // width of the column of labels (unit: body text)
+
+}  // namespace
 
 PixelRect take_place(float height) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -116,12 +121,31 @@ PixelRect take_place(float height) {
 }
 void label_beside(const Pen& pen, const std::string& words) {
   label(words);
-  ImGui::SameLine(9.2F * pen.em);
+  ImGui::SameLine(kLabel_em * pen.em);
   ImGui::SetNextItemWidth(-0.1F * pen.em);
 }
 void label(const std::string& words) {
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(words.c_str());
+}
+void tick_beside(const Pen& pen, const std::string& words, const glm::vec3& colour, bool& on) {
+  swatch(pen, colour);
+  ImGui::SameLine();
+  const std::string id = "##shown " + words;
+  ImGui::Checkbox(id.c_str(), &on);
+  ImGui::SameLine();
+  const float left = ImGui::GetCursorPosX();
+  label(pen.fit(words, kLabel_em * pen.em - left));
+  ImGui::SameLine(kLabel_em * pen.em);
+  ImGui::SetNextItemWidth(-0.1F * pen.em);
+}
+void swatch(const Pen& pen, const glm::vec3& colour) {
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const float top = at.y + 0.5F * (ImGui::GetFrameHeight() - pen.em);
+  const ImVec2 end{at.x + pen.em, top + pen.em};
+  ImGui::GetWindowDrawList()->AddRectFilled({at.x, top}, end, ink_of(colour), 2.0F);
+  ImGui::GetWindowDrawList()->AddRect({at.x, top}, end, pen.inks.edge, 2.0F);
+  ImGui::Dummy({pen.em, pen.em});
 }
 void same_line() {
   ImGui::SameLine();
@@ -257,11 +281,7 @@ void Panels::draw_objects(const Pen& pen, const DrawnScene& scene, const Snapsho
             {.verb = ViewVerb::show, .numbers = {visible ? 1.0 : 0.0}, .object = object});
     }
     ImGui::TableNextColumn();
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    const float top = at.y + 0.5F * (ImGui::GetFrameHeight() - pen.em);
-    const ImVec2 end{at.x + pen.em, top + pen.em};
-    ImGui::GetWindowDrawList()->AddRectFilled({at.x, top}, end, ink_of(colour), 2.0F);
-    ImGui::GetWindowDrawList()->AddRect({at.x, top}, end, pen.inks.edge, 2.0F);
+    controls::swatch(pen, colour);
     ImGui::TableNextColumn();
     ImGui::AlignTextToFramePadding();
     const std::string name = pen.fit(object_name(scene, object), ImGui::GetContentRegionAvail().x);
@@ -314,76 +334,6 @@ void Panels::draw_presses(const Pen& pen, const DrawnScene& scene, const Snapsho
   ImGui::EndTable();
 }
 
-void Panels::draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
-                         PanelResult& result) {
-  const double unit = si_of_unit(value.quantity);
-  const std::string unit_words(unit_of(value.quantity));
-  controls::label_beside(pen, words_of_value(value.quantity, value.object == Edit::kTool));
-  float shown = moved_ == index ? moved_to_ : static_cast<float>(now / unit);
-  const std::string format = number_format(shown) + (unit_words.empty() ? "" : " " + unit_words);
-  const int flags = ImGuiSliderFlags_AlwaysClamp | (value.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
-  ImGui::PushID(static_cast<int>(index));
-  const bool changed = ImGui::SliderFloat("##value", &shown, static_cast<float>(value.usual.low / unit),
-                                          static_cast<float>(value.usual.high / unit), format.c_str(), flags);
-  if (ImGui::IsItemHovered() && now != value.in_scene)
-    ImGui::SetTooltip("in the scene: %s %s", with_digits(value.in_scene / unit, 3).c_str(),
-                      unit_words.c_str());
-  if (changed) {
-    moved_to_ = shown;
-    const double si = std::clamp(static_cast<double>(shown) * unit, value.range.low, value.range.high);
-    result.actions.push_back(
-        {.verb = ViewVerb::edit, .numbers = {si}, .object = value.object, .quantity = value.quantity});
-  }
-  if (ImGui::IsItemActive()) {
-    moved_ = index;
-    moved_to_ = shown;
-  } else if (moved_ == index) {
-    moved_ = static_cast<std::size_t>(-1);
-  }
-  ImGui::PopID();
-}
-
-void Panels::draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
-                         const PanelFrame& frame, PanelResult& result) {
-  const std::uint32_t selected = frame.state.selected;
-  bool any = false, edited = false;
-  for (std::size_t n = 0; n < scene.editable.size() && n < snapshot.values.size(); ++n) {
-    const EditableValue& value = scene.editable[n];
-    if (value.object != selected) continue;
-    draw_slider(pen, n, value, snapshot.values[n], result);
-    any = true;
-    edited = edited || snapshot.values[n] != value.in_scene;
-  }
-  const bool tissue = selected < scene.objects.size() && scene.objects[selected].choices.tissue;
-  if (tissue) draw_choices(pen, scene, frame, result);
-  if (!any && !tissue) ImGui::TextDisabled("Its values are fixed while it is felt.");
-  if (selected == Edit::kTool) ImGui::TextDisabled("Select an object above to change its stiffness.");
-  if (selected < scene.objects.size()) {
-    controls::label_beside(pen, "opacity");
-    float opacity = 100.0F * frame.state.view.look_of(selected).opacity;
-    if (ImGui::SliderFloat("##opacity", &opacity, 0.0F, 100.0F, "%.0f %%", ImGuiSliderFlags_AlwaysClamp))
-      result.actions.push_back({.verb = ViewVerb::opacity, .numbers = {0.01 * opacity}, .object = selected});
-  }
-  if (selected < scene.objects.size()) {
-    bool moves = frame.state.moves;
-    ImGui::BeginDisabled(!scene.objects[selected].choices.open);
-    if (ImGui::Checkbox("arrows to move it (O)", &moves))
-      result.actions.push_back({.verb = ViewVerb::arrows, .numbers = {moves ? 1.0 : 0.0}});
-    ImGui::EndDisabled();
-  }
-  ImGui::BeginDisabled(!edited);
-  if (any && ImGui::Button("Values of the scene")) {
-    for (const EditableValue& value : scene.editable) {
-      if (value.object == selected)
-        result.actions.push_back({.verb = ViewVerb::edit,
-                                  .numbers = {value.in_scene},
-                                  .object = value.object,
-                                  .quantity = value.quantity});
-    }
-  }
-  ImGui::EndDisabled();
-}
-
 void Panels::take_input() {
   ImGuiIO& io = ImGui::GetIO();
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
@@ -396,11 +346,16 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
   PanelResult& result = result_;
   set_style(pen, frame.state.view.dark);
   ImGui::PushFont(pen.body);
-  if (frame.handles != nullptr) {
-    Pen behind = pen;
-    behind.list = ImGui::GetBackgroundDrawList();
-    draw_move_handles(behind, *frame.handles, frame.camera, frame.scene_place);
-  }
+  Pen behind = pen;
+  behind.list = ImGui::GetBackgroundDrawList();
+  const PixelRect& scene_place = frame.scene_place;
+  behind.list->PushClipRect({static_cast<float>(scene_place.x), static_cast<float>(scene_place.y)},
+                            {static_cast<float>(scene_place.x + scene_place.width),
+                             static_cast<float>(scene_place.y + scene_place.height)});
+  if (frame.state.map) draw_map_boxes(behind, frame.notes.boxes, frame.camera, frame.scene_place);
+  if (frame.state.trail) draw_trail(behind, frame.history, frame.camera, frame.scene_place);
+  if (frame.handles != nullptr) draw_move_handles(behind, *frame.handles, frame.camera, frame.scene_place);
+  behind.list->PopClipRect();
   ImGui::SetNextWindowPos({static_cast<float>(where.x), static_cast<float>(where.y)});
   ImGui::SetNextWindowSize({static_cast<float>(where.width), static_cast<float>(where.height)});
   constexpr ImGuiWindowFlags flags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
@@ -409,38 +364,49 @@ void Panels::draw(const Pen& pen, const DrawnScene& scene, const Snapshot& snaps
     if (frame.input.by_keyboard && !ImGui::IsWindowFocused(ImGuiFocusedFlags_ChildWindows))
       ImGui::SetWindowFocus();
     const TickTimes times = frame.history.times();
-    if (open_section("Session")) {
-      draw_session(frame, snapshot, times, result);
-      draw_past(pen, frame, result);
+    if (frame.notes.begins) {
+      if (open_section("Open")) draw_open(frame, result);
+    } else {
+      draw_sections(pen, scene, snapshot, frame, times, result);
     }
-    if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
-    if (has_soft(scene) && open_section("Forces between objects")) {
-      result.wants_presses = true;
-      draw_presses(pen, scene, snapshot, frame);
-    }
-    const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
-    if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
-    if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
-      draw_effect(pen, frame);
-    if (open_section("View")) draw_view(pen, scene, frame, result);
-    if (has_soft(scene) && open_section("Difference of two models", false))
-      draw_difference(pen, scene, snapshot, frame, result);
-    Pen chart = pen;
-    chart.list = ImGui::GetWindowDrawList();
-    if (open_section("Force")) draw_force(chart, scene, frame, result);
-    if (open_section("Ticks")) {
-      draw_tick_times(chart, controls::take_place(kTickChart_em * pen.em), times);
-      draw_stage_times(chart, controls::take_place(kStageRow_em * pen.em * static_cast<float>(kStages)),
-                       times);
-      if (frame.notes.unseen_ticks > 0)
-        ImGui::TextDisabled("%llu ticks are not in the charts",
-                            static_cast<unsigned long long>(frame.notes.unseen_ticks));
-    }
-    if (open_section("Numbers of the tick", !frame.state.watched.empty())) draw_watch(pen, frame, result);
   }
   ImGui::End();
   result.wants_text = ImGui::GetIO().WantTextInput;
   ImGui::PopFont();
+}
+
+void Panels::draw_sections(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                           const PanelFrame& frame, const TickTimes& times, PanelResult& result) {
+  if (open_section("Session")) {
+    draw_session(frame, snapshot, times, result);
+    draw_past(pen, frame, result);
+  }
+  if (open_section("Objects")) draw_objects(pen, scene, snapshot, frame, result);
+  if (has_soft(scene) && open_section("Forces between objects")) {
+    result.wants_presses = true;
+    draw_presses(pen, scene, snapshot, frame);
+  }
+  const std::string values = "Values: " + object_name(scene, frame.state.selected) + "###values";
+  if (open_section(values.c_str())) draw_values(pen, scene, snapshot, frame, result);
+  if ((frame.notes.effect || !frame.notes.building.empty()) && open_section("Before and after"))
+    draw_effect(pen, frame);
+  if (open_section("View")) draw_view(pen, scene, frame, result);
+  if (has_soft(scene) && open_section("Difference of two models", false))
+    draw_difference(pen, scene, snapshot, frame, result);
+  Pen chart = pen;
+  chart.list = ImGui::GetWindowDrawList();
+  if (open_section("Force")) draw_force(chart, scene, frame, result);
+  if (open_section("Ticks")) {
+    draw_tick_times(chart, controls::take_place(kTickChart_em * pen.em), times);
+    draw_stage_times(chart, controls::take_place(kStageRow_em * pen.em * static_cast<float>(kStages)), times);
+    draw_rates(pen, frame);
+    if (frame.notes.unseen_ticks > 0)
+      ImGui::TextDisabled("%llu ticks are not in the charts",
+                          static_cast<unsigned long long>(frame.notes.unseen_ticks));
+  }
+  if (open_section("Numbers of the tick", !frame.state.watched.empty())) draw_watch(pen, frame, result);
+  const bool offers = !frame.notes.recent.empty() || !frame.notes.shipped.empty();
+  if (offers && open_section("Open", false)) draw_open(frame, result);
 }
 
 }  // namespace hybrid

@@ -3,11 +3,13 @@
 // tick times. It draws with Dear ImGui and returns actions. It changes nothing itself.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "hybrid/snapshot/map_boxes.h"
 #include "hybrid/view/layout.h"
 #include "hybrid/view/overlay_panel.h"
 #include "hybrid/view/text_painter.h"
@@ -17,6 +19,18 @@
 #include "hybrid/window/view_state.h"
 
 namespace hybrid {
+
+// A scene that the window offers to open.
+struct OfferedScene {
+  std::filesystem::path file;
+  std::string words{};  // the first line of its comments
+};
+
+// How often something happened in a second, and the share of a processor that it took; negative: not known.
+struct ThreadRate {
+  std::string name{};
+  double per_s = -1.0, busy = -1.0;
+};
 
 // Data that the session gives its window besides snapshots.
 struct SessionNotes {
@@ -29,9 +43,13 @@ struct SessionNotes {
   // Ages of the kept states (s), the oldest first, and the memory of all of them.
   std::vector<double> kept_s{};
   std::size_t kept_bytes = 0;
-  std::string building{};                // progress of a changed scene that is built; empty: none
-  std::optional<ChangeEffect> effect{};  // of the last change of the scene
-  std::string comparing{};               // progress of a comparison of two models; empty: none goes on
+  std::string building{};                         // progress of a changed scene that is built; empty: none
+  std::optional<ChangeEffect> effect{};           // of the last change of the scene
+  std::vector<OfferedScene> recent{}, shipped{};  // scenes to open
+  bool begins = false;                            // nothing is played yet: a scene is to be chosen
+  std::vector<ThreadRate> rates{};
+  std::vector<MapBox> boxes{};  // near the tool, if the user asked for them
+  std::string comparing{};      // progress of a comparison of two models; empty: none goes on
 };
 
 // The data that the panel shows in one frame.
@@ -63,19 +81,37 @@ class Panels final : public OverlayPanel {
             const PixelRect& where) override;
 
  private:
+  void draw_sections(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
+                     const PanelFrame& frame, const TickTimes& times, PanelResult& result);
   void draw_session(const PanelFrame& frame, const Snapshot& snapshot, const TickTimes& times,
                     PanelResult& result) const;
   void draw_objects(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                     const PanelFrame& frame, PanelResult& result) const;
   void draw_presses(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                     const PanelFrame& frame) const;
+  // ---- panel_values.cpp ----
   void draw_values(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot, const PanelFrame& frame,
                    PanelResult& result);
   void draw_slider(const Pen& pen, std::size_t index, const EditableValue& value, double now,
                    PanelResult& result);
+  // ---- panel_materials.cpp ----
+  void draw_materials(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame,
+                      PanelResult& result) const;
   // ---- panel_choices.cpp ----
   void draw_choices(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
-  void draw_young(const Pen& pen, const MaterialChoice& material, PanelResult& result);
+  // A value whose change needs a new world, and the range of its slider (SI).
+  struct BuiltValue {
+    SceneChange::Key key = SceneChange::Key::young;
+    std::string name{};  // of the material; empty: of the tool
+    std::string label{}, tip{};
+    double in_scene = 0.0, low = 0.0, high = 0.0;
+    double unit_SI = 1.0;  // the unit of the shown number
+    std::string unit_words{};
+  };
+  void draw_built_value(const Pen& pen, const BuiltValue& value, PanelResult& result);
+  void draw_limits(const Pen& pen, const std::vector<MaterialChoice>& materials, PanelResult& result);
+  void draw_tool_size(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
+  void forget_asked_value(const PanelFrame& frame);
   void draw_effect(const Pen& pen, const PanelFrame& frame) const;
   // ---- panel_force.cpp ----
   void draw_force(const Pen& chart, const DrawnScene& scene, const PanelFrame& frame,
@@ -84,6 +120,9 @@ class Panels final : public OverlayPanel {
   // ---- panel_difference.cpp ----
   void draw_difference(const Pen& pen, const DrawnScene& scene, const Snapshot& snapshot,
                        const PanelFrame& frame, PanelResult& result);
+  // ---- panel_open.cpp ----
+  void draw_open(const PanelFrame& frame, PanelResult& result) const;
+  void draw_rates(const Pen& pen, const PanelFrame& frame) const;
   // ---- panel_view.cpp ----
   void draw_past(const Pen& pen, const PanelFrame& frame, PanelResult& result) const;
   void draw_view(const Pen& pen, const DrawnScene& scene, const PanelFrame& frame, PanelResult& result);
@@ -99,13 +138,15 @@ class Panels final : public OverlayPanel {
   // frame later.
   std::size_t moved_ = static_cast<std::size_t>(-1);
   float moved_to_ = 0.0F;
-  // Young's modulus (kPa) that the user gives to a material, until the changed scene is there.
-  struct AskedYoung {
-    std::string material;
-    float young_kPa = 0.0F;
+  // A value that the user gives to a material or to the tool, until the changed scene is there.
+  struct AskedValue {
+    SceneChange::Key key = SceneChange::Key::young;
+    std::string name{};
+    float shown = 0.0F;   // in the slider's unit
     int frames_left = 0;  // number of frames in which it is shown although no scene is being built
   };
-  std::optional<AskedYoung> asked_young_;
+  std::optional<AskedValue> asked_value_;
+  std::string limits_of_{};  // the material whose limits are shown
   // The models of an object that the user chose to compare.
   struct ChosenModels {
     const DrawnScene* scene = nullptr;
@@ -119,6 +160,14 @@ class Panels final : public OverlayPanel {
 // Draws the arrows by which an object is moved (panel_handles.cpp).
 void draw_move_handles(const Pen& pen, const MoveHandles& handles, const Camera& camera,
                        const PixelRect& where);
+
+// Draws cells of the map (rigid: orange, soft: green) and patches (blue, the coarser the paler)
+// (panel_map.cpp).
+void draw_map_boxes(const Pen& pen, const std::vector<MapBox>& boxes, const Camera& camera,
+                    const PixelRect& where);
+
+// Draws the path of the hand as the history has it, the oldest part pale (panel_handles.cpp).
+void draw_trail(const Pen& pen, const TickHistory& history, const Camera& camera, const PixelRect& where);
 
 // ---- charts (panel_charts.cpp) ----
 // Draws the force of the last seconds. Each pixel column has a line from the least to the largest force in

@@ -115,6 +115,15 @@ void TickHistory::mark(double t_s) {
       .t_s = t_s, .before = times(from_s, t_s), .most_before_N = most_N(ForceSeries::total, from_s, t_s)};
 }
 
+std::vector<glm::dvec3> TickHistory::path_m(std::size_t count) const {
+  std::vector<glm::dvec3> path;
+  const std::size_t ticks = samples_.size();
+  const std::size_t step = std::max<std::size_t>(ticks / std::max<std::size_t>(count, 1) + 1, 1);
+  for (std::size_t n = 0; n < ticks; n += step) path.push_back(samples_[n].device_m);
+  if (ticks > 0) path.push_back(samples_.back().device_m);
+  return path;
+}
+
 double TickHistory::most_N(ForceSeries series) const {
   return most_N(series, 0.0, kEver);
 }

@@ -76,6 +76,8 @@ class TickHistory {
     double now = 0.0, least = 0.0, most = 0.0;
   };
   [[nodiscard]] std::optional<NumberRange> range(const std::function<double(const TickSample&)>& of) const;
+  // Places of the device, about `count` at even times, from the oldest to the newest.
+  [[nodiscard]] std::vector<glm::dvec3> path_m(std::size_t count) const;
   [[nodiscard]] double most_N(ForceSeries series) const;  // largest force
   [[nodiscard]] double most_N() const;                    // of all series
   [[nodiscard]] double most_N(ForceSeries series, double from_s, double to_s) const;

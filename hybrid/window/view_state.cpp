@@ -14,9 +14,20 @@ void set_or_flip(bool& value, const ViewAction& action) {
   value = action.numbers.empty() ? !value : action.numbers.front() != 0.0;
 }
 
-ObjectLook& look_in(ViewSettings& view, std::uint32_t object) {
-  if (view.looks.size() <= object) view.looks.resize(std::size_t{object} + 1);
-  return view.looks[object];
+// Changes the look of an object, or of one of its materials.
+template <class Change>
+void change_look(ViewSettings& view, const ViewAction& action, const Change& change) {
+  if (action.object == Edit::kTool) return;
+  const std::size_t object = action.object;
+  if (action.text.empty()) {
+    if (view.looks.size() <= object) view.looks.resize(object + 1);
+    change(view.looks[object]);
+    return;
+  }
+  if (view.material_looks.size() <= object) view.material_looks.resize(object + 1);
+  Look& look = view.material_looks[object][action.text];
+  change(look);
+  if (look == Look{}) view.material_looks[object].erase(action.text);
 }
 
 void move_slice(ViewSettings& view, const std::vector<double>& numbers) {
@@ -34,11 +45,15 @@ void act_on_view(ViewState& state, const ViewAction& action) {
   ViewSettings& view = state.view;
   switch (action.verb) {
     case ViewVerb::show:
-      if (action.object != Edit::kTool) look_in(view, action.object).visible = number_of(action, 1.0) != 0.0;
+      change_look(view, action, [&](Look& look) { look.visible = number_of(action, 1.0) != 0.0; });
       break;
     case ViewVerb::opacity:
-      if (action.object != Edit::kTool)
-        look_in(view, action.object).opacity = static_cast<float>(std::clamp(number_of(action), 0.0, 1.0));
+      change_look(view, action, [&](Look& look) {
+        look.opacity = static_cast<float>(std::clamp(number_of(action), 0.0, 1.0));
+      });
+      break;
+    case ViewVerb::wires:
+      set_or_flip(view.wires, action);
       break;
     case ViewVerb::clip:
       set_or_flip(view.clip.on, action);
@@ -109,6 +124,9 @@ void act_on_session(ViewState& state, const ViewAction& action) {
       state.comparison = action.comparison;
       if (!action.comparison.object.empty()) state.view.colour = TissueColour::difference;
       break;
+    case ViewVerb::open:
+      state.opened.emplace_back(action.text);
+      break;
     case ViewVerb::screenshot:
       state.screenshot = action.text;
       break;
@@ -129,16 +147,19 @@ void act_on_session(ViewState& state, const ViewAction& action) {
 }  // namespace
 
 void go_to_scene(ViewState& state, const DrawnScene& before, const DrawnScene& after) {
-  std::vector<ObjectLook> looks(after.objects.size());
+  std::vector<Look> looks(after.objects.size());
+  decltype(state.view.material_looks) material_looks(after.objects.size());
   std::uint32_t selected = Edit::kTool;
   for (std::uint32_t o = 0; o < after.objects.size(); ++o) {
     const auto same = std::ranges::find(before.objects, after.objects[o].name, &DrawnObject::name);
     if (same == before.objects.end()) continue;
     const auto old = static_cast<std::uint32_t>(same - before.objects.begin());
     looks[o] = state.view.look_of(old);
+    if (state.view.separates_materials(old)) material_looks[o] = state.view.material_looks[old];
     if (state.selected == old) selected = o;
   }
   state.view.looks = std::move(looks);
+  state.view.material_looks = std::move(material_looks);
   state.selected = selected;
   state.edits.clear();  // they name objects of the old scene
 }
@@ -153,6 +174,12 @@ void act(ViewState& state, const ViewAction& action) {
       return;
     case ViewVerb::arrows:
       set_or_flip(state.moves, action);
+      return;
+    case ViewVerb::map:
+      set_or_flip(state.map, action);
+      return;
+    case ViewVerb::trail:
+      set_or_flip(state.trail, action);
       return;
     case ViewVerb::stack:
       set_or_flip(state.stacked, action);

@@ -14,34 +14,38 @@
 namespace hybrid {
 
 enum class ViewVerb : std::uint8_t {
-  pause,       // numbers: 1 on, 0 off, none: toggle
-  step,        // does one tick while paused
-  rest,        // numbers: 1 compares with the force at rest, 0 ends it, none: toggle
-  stack,       // numbers: 1 the parts of the force as areas, 0 as lines, none: toggle
-  watch,       // text: name of a number of the tick; begins to watch it, or ends
-  speed,       // numbers: simulated time over real time
-  restart,     // starts the hand's path again
-  edit,        // object, quantity, numbers: the value in SI
-  change,      // change: of the scene, which is built again
-  difference,  // comparison: begins it, of two models over a surface; without an object: ends the present one
-  look_back,   // numbers: seconds before now; 0: the present
-  go_on,       // the session goes on from the past that is shown
-  arrows,      // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
-  select,      // object
-  show,        // object, numbers: 1 visible, 0 hidden
-  opacity,     // object, numbers: 0 to 1
-  clip,        // numbers: 1 on, 0 off, none: toggle
-  clip_axis,   // numbers: 0 x, 1 y, 2 z
-  clip_place,  // numbers: 0 to 1 along the axis
-  clip_side,   // leaves out the other side
-  slice,       // numbers: axis (0 x, 1 y, 2 z), place 0 to 1, or negative: off; none: all on or all off
-  slice_grey,  // numbers: 1 grey values of the scan, 0 materials, none: toggle
-  colour,      // numbers: TissueColour; none: the next one
-  look,        // text: "all", "contact", "x", "y", "z"
-  dark,        // numbers: 1 dark, 0 light, none: toggle
-  panels,      // numbers: 1 shown, 0 hidden, none: toggle
-  inset,       // numbers: 1 shown, 0 hidden, none: toggle
-  screenshot,  // text: the file; empty: an unused name
+  pause,           // numbers: 1 on, 0 off, none: toggle
+  step,            // does one tick while paused
+  rest,            // numbers: 1 compares with the force at rest, 0 ends it, none: toggle
+  stack,           // numbers: 1 the parts of the force as areas, 0 as lines, none: toggle
+  watch,           // text: name of a number of the tick; begins to watch it, or ends
+  speed,           // numbers: simulated time over real time
+  restart,         // starts the hand's path again
+  edit,            // object, quantity, numbers: the value in SI
+  change,          // change: of the scene, which is built again
+  difference,      // comparison: begins it, of two models over a surface; without an object: ends it
+  look_back,       // numbers: seconds before now; 0: the present
+  go_on,           // the session goes on from the past that is shown
+  arrows,          // numbers: 1 shown, 0 hidden, none: toggle; they move the selected object
+  select,          // object
+  show,            // object, numbers: 1 visible, 0 hidden; text: a material of the object, or empty
+  opacity,         // object, numbers: 0 to 1; text: as of show
+  wires,           // numbers: 1 edges of triangles are drawn, 0 not, none: toggle
+  clip,            // numbers: 1 on, 0 off, none: toggle
+  clip_axis,       // numbers: 0 x, 1 y, 2 z
+  clip_place,      // numbers: 0 to 1 along the axis
+  clip_side,       // leaves out the other side
+  slice,           // numbers: axis (0 x, 1 y, 2 z), place 0 to 1, or negative: off; none: all on or all off
+  slice_grey,      // numbers: 1 grey values of the scan, 0 materials, none: toggle
+  colour,          // numbers: TissueColour; none: the next one
+  look,            // text: "all", "contact", "x", "y", "z"
+  dark,            // numbers: 1 dark, 0 light, none: toggle
+  panels,          // numbers: 1 shown, 0 hidden, none: toggle
+  inset,           // numbers: 1 shown, 0 hidden, none: toggle
+  map,             // numbers: 1 cells of the map and patches are drawn, 0 not, none: toggle
+  trail,           // numbers: 1 the hand's path of the last seconds is drawn, 0 not, none: toggle
+  open,            // text: a file, which is opened as if it were dropped onto the window
+  screenshot,      // text: the file; empty: an unused name
   save_recording,  // text: the file; empty: an unused name
   save_scene,      // writes edits to the scene's file
   reload,          // reads the scene's file again
@@ -67,6 +71,8 @@ struct ViewState {
   bool panels = true;
   std::uint32_t selected = Edit::kTool;
   bool moves = false;                  // arrows on the selected object are shown
+  bool map = false;                    // cells of the map near the tool, and patches, are drawn
+  bool trail = false;                  // the hand's path of the last seconds is drawn
   bool stacked = false;                // the chart of the force shows its parts as areas
   std::vector<std::string> watched{};  // names of numbers (watched_numbers.h)
   // ---- requests to the session; the owner of the session takes counters and lists ----
@@ -77,9 +83,9 @@ struct ViewState {
   bool go_on = false;
   std::vector<Edit> edits{};
   std::vector<SceneChange> changes{};
-  std::optional<ModelComparison>
-      comparison{};  // comparison to begin; without an object: the present one ends
+  std::optional<ModelComparison> comparison{};  // to begin; without an object: the present one ends
   std::optional<std::filesystem::path> screenshot{}, recording{};  // empty path: an unused name
+  std::vector<std::filesystem::path> opened{};  // files to open, in the order in which they were dropped
   bool save_scene = false, reload = false, quit = false;
   std::string look{};  // the requested view, as the text of ViewVerb::look
 };

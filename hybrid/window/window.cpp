@@ -325,6 +325,10 @@ Window::Window(const DrawnScene& scene, const WindowOptions& options) {
     if (state.wants_text) state.input.typed.push_back(static_cast<char32_t>(c));
   });
   glfwSetWindowRefreshCallback(handle, [](GLFWwindow* w) { State::of(w).exposed = true; });
+  glfwSetDropCallback(handle, [](GLFWwindow* w, int count, const char** files) {
+    for (int n = 0; n < count; ++n)
+      hybrid::act(State::of(w).user, {.verb = ViewVerb::open, .text = files[n]});
+  });
   glfwSetScrollCallback(handle, [](GLFWwindow* w, double, double y) { State::of(w).wheel(y); });
   glfwMakeContextCurrent(handle);
   glfwSwapInterval(options.visible ? 1 : 0);
@@ -374,11 +378,13 @@ bool Window::frame(const Snapshot& snapshot, const SessionNotes& notes) {
   return true;
 }
 
-void Window::add_ticks(TickSamples& samples, ForcesAtRest* at_rest) {
+std::size_t Window::add_ticks(TickSamples& samples, ForcesAtRest* at_rest) {
   TickSample sample;
   while (samples.pop(sample)) state_->history.add(sample);
   ForceAtRest found;
-  while (at_rest != nullptr && at_rest->pop(found)) state_->history.add(found);
+  std::size_t count = 0;
+  for (; at_rest != nullptr && at_rest->pop(found); ++count) state_->history.add(found);
+  return count;
 }
 
 void Window::act(const ViewAction& action) {
@@ -399,6 +405,7 @@ WindowInput Window::take_input() {
   return {.dragged_goal_m = s.goal_m,
           .paused = s.user.paused,
           .wants_presses = s.wants_presses,
+          .wants_boxes = s.user.map && s.user.panels,
           .compares_with_rest = s.user.compares_with_rest,
           .speed = s.user.speed,
           .restarts = s.user.restarts,
@@ -408,6 +415,7 @@ WindowInput Window::take_input() {
           .edits = std::exchange(s.user.edits, {}),
           .changes = std::exchange(s.user.changes, {}),
           .comparison = std::exchange(s.user.comparison, {}),
+          .opened = std::exchange(s.user.opened, {}),
           .recording = std::exchange(s.user.recording, {}),
           .save_scene = std::exchange(s.user.save_scene, false),
           .reload = std::exchange(s.user.reload, false),

@@ -31,6 +31,7 @@ struct WindowInput {
   std::optional<glm::dvec3> dragged_goal_m;
   bool paused = false;
   bool wants_presses = false;  // the frame shows Snapshot::presses
+  bool wants_boxes = false;    // the frame shows SessionNotes::boxes
   bool compares_with_rest = false;
   double speed = 1.0;
   std::uint32_t restarts = 0, single_ticks = 0;  // counted since the window opened
@@ -40,6 +41,7 @@ struct WindowInput {
   std::vector<Edit> edits;
   std::vector<SceneChange> changes;
   std::optional<ModelComparison> comparison;       // as ViewState::comparison
+  std::vector<std::filesystem::path> opened;       // files that were dropped or chosen
   std::optional<std::filesystem::path> recording;  // recording to be saved; empty path: an unused name
   bool save_scene = false, reload = false, go_on = false;
 };
@@ -71,7 +73,8 @@ class Window {
   bool frame(const Snapshot& snapshot, const SessionNotes& notes = {});
 
   // Adds every tick since the last frame, and every force at rest, for the charts. `at_rest`: null for none.
-  void add_ticks(TickSamples& samples, ForcesAtRest* at_rest = nullptr);
+  // Returns how many forces at rest there were.
+  std::size_t add_ticks(TickSamples& samples, ForcesAtRest* at_rest = nullptr);
   // Does an action of a script in the next frame.
   void act(const ViewAction& action);
   // Returns the input since the last call.

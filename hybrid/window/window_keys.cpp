@@ -16,7 +16,7 @@ struct KeyAction {
   std::string_view text{};
   double number = -1.0;  // negative: none
 };
-constexpr std::array<KeyAction, 32> kKeyActions{{{"space", ViewVerb::pause},
+constexpr std::array<KeyAction, 35> kKeyActions{{{"space", ViewVerb::pause},
                                                  {"n", ViewVerb::step},
                                                  {"r", ViewVerb::restart},
                                                  {"1", ViewVerb::speed, {}, 1.0},
@@ -35,6 +35,9 @@ constexpr std::array<KeyAction, 32> kKeyActions{{{"space", ViewVerb::pause},
                                                  {"v", ViewVerb::slice},
                                                  {"g", ViewVerb::slice_grey},
                                                  {"m", ViewVerb::colour},
+                                                 {"u", ViewVerb::wires},
+                                                 {"d", ViewVerb::trail},
+                                                 {"j", ViewVerb::map},
                                                  {"o", ViewVerb::arrows},
                                                  {",", ViewVerb::look_back},
                                                  {".", ViewVerb::look_back},

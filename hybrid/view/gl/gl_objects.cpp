@@ -123,6 +123,11 @@ void write_colours(bool written) {
   glColorMask(mask, mask, mask, mask);
 }
 
+void draw_edges_only(bool edges) {
+  glPolygonMode(GL_FRONT_AND_BACK, edges ? GL_LINE : GL_FILL);
+  glDepthMask(edges ? GL_FALSE : GL_TRUE);
+}
+
 const void* buffer_offset(std::size_t bytes) {
   // OpenGL takes an offset as a pointer.
   return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr)

@@ -57,6 +57,8 @@ void clip_by_planes(bool cut, bool view);
 void hide_backs(bool hidden);
 // false: triangles write their depth only.
 void write_colours(bool written);
+// true: only the edges of triangles are drawn, and they write no depth.
+void draw_edges_only(bool edges);
 
 // A byte offset into a buffer, as the pointer that OpenGL takes.
 const void* buffer_offset(std::size_t bytes);

@@ -9,6 +9,7 @@ rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder" || exit 1
 command -v Xvfb > /dev/null || exit 77
+export XDG_STATE_HOME=$folder/state # the list of recent scenes
 
 fail() {
   echo "FAILED: $*"

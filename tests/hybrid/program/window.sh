@@ -12,6 +12,7 @@ mkdir -p "$folder"
 cd "$folder" || exit 1
 command -v Xvfb xdotool > /dev/null || exit 77
 export MESA_DEBUG=1 # makes Mesa write every error of a call
+export XDG_STATE_HOME=$folder/state
 pause_s=${PAUSE_S:-0.15}
 
 fail() {
@@ -128,12 +129,59 @@ visit() {
   cd ..
 }
 
+# offered SCENE: a window without a scene offers some. Files are opened as if they were dropped: those that are broken or
+# no scene are refused, and what was shown goes on; a mesh is added; another scene takes the place of the first.
+offered() {
+  name=offered
+  mkdir "$name"
+  cd "$name" || exit 1
+  cp "$1" first.toml
+  sed 's/^title = .*/title = "second"/' "$1" > second.toml
+  echo 'format = 1 nonsense' > broken.toml
+  printf 'solid s\nendsolid s\n' > empty.stl
+  printf 'OFF\n4 4 0\n200 0 0\n205 0 0\n200 5 0\n200 0 5\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n' > corner.off
+  cat > user.txt <<- END
+	0.1 picture list.png
+	0.2 open $PWD/broken.toml
+	1.2 picture refused.png
+	1.3 open $PWD/first.toml
+	END
+  # What follows counts from the opening of the window, so it waits long enough for the scene to be built.
+  cat >> user.txt <<- END
+	8 open $PWD/broken.toml
+	9 open $PWD/empty.stl
+	10 open $PWD/scan.nii.gz
+	11 open $PWD/corner.off
+	14 trail on
+	14 wires on
+	15 picture added.png
+	15.1 record added.rec
+	15.2 open $PWD/second.toml
+	20 picture second.png
+	20.5 record second.rec
+	21 quit
+	END
+  "$program" view --script user.txt --width 1280 --height 900 > view.log 2>&1 &
+  session=$!
+  for file in list.png refused.png added.png added.rec second.png second.rec; do await "$file"; done
+  wait "$session" || fail "$name: exit status $?: $(tail -3 view.log)"
+  grep -q "User error\|GL_INVALID" view.log && fail "$name: $(grep -m3 "User error\|GL_INVALID" view.log)"
+  for recording in added.rec second.rec; do
+    "$program" replay "$recording" > replay.log 2>&1 || fail "$name: $recording does not replay: $(cat replay.log)"
+  done
+  grep -q corner added.rec || fail "$name: the mesh was not added"
+  printf '%s\n' "$PWD/second.toml" "$PWD/first.toml" | cmp -s - "$XDG_STATE_HOME/hybrid/recent" ||
+    fail "$name: the list of recent scenes is $(cat "$XDG_STATE_HOME/hybrid/recent")"
+  cd ..
+}
+
 touch number # before the server opens it
 Xvfb -displayfd 3 -screen 0 2600x1900x24 3> number > server.log 2>&1 &
 server=$!
 for ((n = 0; n < 300 && $(wc -c < number) == 0; ++n)); do sleep 0.1; done
 DISPLAY=:$(cat number)
 export DISPLAY
+offered "$1"
 for scene in "$@"; do visit "$scene"; done
 kill "$server"
 wait "$server" 2> /dev/null

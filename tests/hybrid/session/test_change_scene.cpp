@@ -38,6 +38,11 @@ class ChangedScene : public tests::SceneFile {
            "[material.gel]\nyoung = " + std::to_string(young) + "\n" + more +
            "[path]\nkind = \"press\"\nfrom = [0, 0, 20]\nto = [0, 0, 4]\nspeed = 100\nhold = 5\n";
   }
+  static std::string with_gel(const std::string& keys) {
+    const std::string header = "[material.gel]\n";
+    std::string text = text_of({});
+    return text.insert(text.find(header) + header.size(), keys);
+  }
   std::unique_ptr<Built> build(const std::string& text) const {
     auto out = std::make_unique<Built>();
     out->text = text;
@@ -91,7 +96,9 @@ TEST_F(ChangedScene, FeelsAsIfItHadBeenThatSceneFromTheBeginning) {
   const std::string finer = "spacing = 1\n";
   std::string fine = text_of({});
   fine.replace(fine.find("spacing = 2\n"), finer.size(), finer);
-  for (const std::string& text : {text_of({}, 24000.0), text_of(kTrilinear), text_of(kRigid), fine}) {
+  const std::string larger_tool = text_of({}) + "[tool]\nradius = 3\n";
+  for (const std::string& text : {text_of({}, 24000.0), text_of(kTrilinear), text_of(kRigid), fine,
+                                  with_gel("poisson = 0.1\n"), larger_tool}) {
     begin(text_of({}));
     steps(400);
     const double before = glm::length(player_->felt().force_N);
@@ -105,6 +112,22 @@ TEST_F(ChangedScene, FeelsAsIfItHadBeenThatSceneFromTheBeginning) {
     EXPECT_NEAR(glm::length(player_->felt().force_N), wanted, 0.02 * wanted) << text;
     expect_replays();
   }
+}
+
+// There is no force at rest to compare with where links are at their limits, so whole sessions are compared.
+TEST_F(ChangedScene, NarrowerLimitsFeelAsFromTheBeginningAndReplay) {
+  const std::string narrow = with_gel("stretch = [0.9, 1.1]\nshear = 0.1\n");
+  begin(narrow);
+  steps(900);
+  const double wanted = glm::length(player_->felt().force_N);
+  begin(text_of({}));
+  steps(400);
+  const double wide = glm::length(player_->felt().force_N);
+  (void)change(narrow);
+  steps(500);
+  EXPECT_GT(wanted, 1.1 * wide) << "the limits are felt";
+  EXPECT_NEAR(glm::length(player_->felt().force_N), wanted, 0.05 * wanted);
+  expect_replays();
 }
 
 TEST_F(ChangedScene, ClockAndEditsGoOnAndOtherForcesDoNotJump) {

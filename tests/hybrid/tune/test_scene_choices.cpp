@@ -67,6 +67,11 @@ TEST(SceneChoices, ChangeOneValueAndKeepEverythingElse) {
   const std::vector<std::pair<SceneChange, std::string>> cases{
       {{Key::young, "gel", {12000, 0, 0}}, "young = 12000 # Pa"},
       {{Key::young, "fat", {3000, 0, 0}}, "[material.fat]\nyoung = 3000\npoisson = 0.4"},
+      {{Key::poisson, "fat", {0.45, 0, 0}}, "poisson = 0.45"},
+      {{Key::shortest, "gel", {0.7, 0, 0}}, "stretch = [0.7, 1.6]"},
+      {{Key::longest, "fat", {1.2, 0, 0}}, "stretch = [0.4, 1.2]"},
+      {{Key::shear, "gel", {0.25, 0, 0}}, "shear = 0.25"},
+      {{Key::radius, "", {3e-3, 0, 0}}, "[tool]\nradius = 3"},
       {{Key::model, "block", {1, 0, 0}}, "name = \"block\"\nmodel = \"proxy\""},
       {{Key::model, "pad", {0, 0, 0}}, "model = \"voxels\""},
       {{Key::energy, "block", {1, 0, 0}}, "energy = \"trilinear\""},
@@ -84,6 +89,34 @@ TEST(SceneChoices, ChangeOneValueAndKeepEverythingElse) {
       changed(kText, {{Key::spacing, "block", {1e-3, 0, 0}}, {Key::young, "gel", {500, 0, 0}}});
   EXPECT_EQ(read(both).materials.at("gel").young_Pa, 500.0);
   EXPECT_EQ(choices_of(drawn(both), "block").spacing_m, 1e-3);
+}
+
+TEST(SceneChoices, TheLimitsOfALengthAreSetOneByOne) {
+  const std::string text = changed(kText, {{Key::shortest, "gel", {0.8, 0, 0}},
+                                           {Key::longest, "gel", {1.1, 0, 0}},
+                                           {Key::radius, "", {1.5e-3, 0, 0}}});
+  const hybrid::Material gel = read(text).materials.at("gel");
+  EXPECT_EQ(gel.stretch_min, 0.8);
+  EXPECT_EQ(gel.stretch_max, 1.1);
+  const hybrid::DrawnScene scene = drawn(text);
+  EXPECT_DOUBLE_EQ(scene.tool_choices.radius_m, 1.5e-3);
+  EXPECT_TRUE(scene.tool_choices.open);
+  EXPECT_EQ(choices_of(scene, "block").materials[0].longest, 1.1);
+  // A material that cannot stretch may not slip: the text is made, and reading it says why it is refused.
+  const std::string stiff = changed(kText, {{Key::shear, "gel", {0, 0, 0}}});
+  EXPECT_THROW((void)read(stiff), hybrid::SceneError);
+}
+
+TEST(SceneChoices, AMeshIsAddedUnderAFreeName) {
+  const std::string once = hybrid::text_with_mesh(kText, "scene.toml", "/data/a \"b\"/ball.stl");
+  EXPECT_NE(once.find("# of the gel"), std::string::npos);
+  const std::string twice = hybrid::text_with_mesh(once, "scene.toml", "/data/skull.obj.gz");
+  const hybrid::Scene scene = read(twice);
+  ASSERT_EQ(scene.rigid.size(), 3U);
+  EXPECT_EQ(scene.rigid[1].name, "ball 2") << "the scene has a ball";
+  EXPECT_EQ(std::get<hybrid::MeshSource>(scene.rigid[1].source).file, "/data/a \"b\"/ball.stl");
+  EXPECT_EQ(scene.rigid[2].name, "skull");
+  EXPECT_THROW((void)hybrid::text_with_mesh(kText, "scene.toml", "/data/a\nb.stl"), std::runtime_error);
 }
 
 TEST(SceneChoices, WhatCannotBeChangedIsSaid) {

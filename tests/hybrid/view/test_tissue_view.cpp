@@ -160,6 +160,47 @@ TEST(TissueViewOf, ColoursTheSurfaceByADifferenceOfModels) {
   EXPECT_EQ(tissue.scale().end, 0.0);
 }
 
+TEST(TissueViewOf, MovesTheSurfacesOfMaterialsWithLooksOfTheirOwn) {
+  tests::Session s = block();
+  hybrid::TissueView tissue(s.scene, glm::dvec3(0.0));
+  ViewSettings view;
+  view.material_looks.resize(1);
+  view.material_looks[0]["gel"].opacity = 0.5F;
+  tissue.set(view);
+  ASSERT_NE(tissue.asked(), nullptr);
+  ASSERT_EQ(tissue.materials(0).size(), 2U);
+  const std::uint64_t both = tissue.asked()->number;
+  view.material_looks[0]["gel"].visible = false;
+  tissue.set(view);
+  ASSERT_EQ(tissue.materials(0).size(), 1U) << "the gel is hidden";
+  EXPECT_NE(tissue.asked()->number, both) << "other points";
+  const hybrid::MaterialSurface& core = tissue.materials(0)[0];
+  EXPECT_EQ(core.material, 1U);
+  // Voxels 5 to 14 of 1 mm: the core ends 5 mm from the middle, and smoothing moves a vertex within its cell.
+  for (const glm::dvec3& at : core.at_rest_m) {
+    const double out = std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)});
+    EXPECT_GT(out, 4.4e-3);
+    EXPECT_LT(out, 5.6e-3);
+  }
+  answer(s.now, *tissue.asked(), stretched(-0.1));
+  tissue.take(s.now);
+  ASSERT_EQ(core.mesh.vertices.size(), core.at_rest_m.size());
+  for (std::size_t v = 0; v < core.at_rest_m.size(); ++v) {
+    const glm::dvec3 moved = stretched(-0.1) * core.at_rest_m[v];
+    EXPECT_NEAR(glm::distance(glm::dvec3(core.mesh.vertices[v].position), core.at_rest_m[v] + moved), 0.0,
+                1e-7);
+    EXPECT_NEAR(core.mesh.vertices[v].value, glm::length(moved), 1e-7);
+  }
+  view.colour = TissueColour::strain;
+  tissue.set(view);
+  answer(s.now, *tissue.asked(), stretched(-0.03));
+  tissue.take(s.now);
+  for (const auto& vertex : tissue.materials(0)[0].mesh.vertices) EXPECT_NEAR(vertex.value, 0.03F, 1e-5F);
+  view.material_looks.clear();
+  tissue.set(view);
+  EXPECT_TRUE(tissue.materials(0).empty());
+}
+
 TEST(SliceFrames, AreGrabbedAtTheirHandleAndFollowThePointer) {
   const tests::Session s = block();
   const hybrid::SoftBox box = hybrid::soft_box(s.scene);
@@ -206,6 +247,58 @@ TEST_F(SlicedPicture, ShowsTheInsideThroughThePaleSurface) {
   // The core's colour shows, mixed with the pale surface.
   const auto colours = hybrid::palette::of_inside(s.scene, 0);
   EXPECT_LT(glm::distance(at_core(sliced), colours[1]), glm::distance(at_core(whole), colours[1]) - 0.1F);
+}
+
+TEST_F(SlicedPicture, ShowsAMaterialWithoutTheOneAroundIt) {
+  tests::Session s = block();
+  hybrid::Camera camera;
+  camera.distance_m = 0.08;
+  camera.azimuth_rad = -0.5 * std::numbers::pi;
+  camera.elevation_rad = 0.2;
+  hybrid::PictureOptions options = tests::small(camera);
+  const auto colour_at = [&](const tests::Image& image, const glm::dvec3& at_m) {
+    return image.at(tests::seen_at(camera, at_m));
+  };
+  const glm::dvec3 middle(0.0), rim(8e-3, 0.0, 0.0);
+  const auto colours = hybrid::palette::of_inside(s.scene, 0);
+  DRAW_OR_SKIP(whole, s, options);
+  options.view.material_looks.resize(1);
+  hybrid::Look& gel = options.view.material_looks[0]["gel"];
+  gel.visible = false;
+  DRAW_OR_SKIP(alone, s, options);
+  EXPECT_LT(glm::distance(colour_at(alone, rim), hybrid::palette::background), 0.01F);
+  EXPECT_LT(glm::distance(colour_at(alone, middle), colours[1]), 0.2F);
+  EXPECT_GT(glm::distance(colour_at(whole, middle), colours[1]), 0.2F);
+  gel = {.visible = true, .opacity = 0.4F};
+  options.view.material_looks[0]["core"].opacity = 0.5F;
+  DRAW_OR_SKIP(both, s, options);
+  EXPECT_GT(glm::distance(colour_at(both, rim), hybrid::palette::background), 0.05F);
+  // The translucent core is seen through the translucent gel: nearer to its colour than the gel beside it.
+  EXPECT_LT(glm::distance(colour_at(both, middle), colours[1]),
+            glm::distance(colour_at(both, rim), colours[1]) - 0.05F);
+}
+
+TEST_F(SlicedPicture, DrawsEdgesOverSurfacesOnDemand) {
+  tests::Session s = block();
+  hybrid::Camera camera;
+  camera.distance_m = 0.08;
+  hybrid::PictureOptions options = tests::small(camera);
+  DRAW_OR_SKIP(plain, s, options);
+  options.view.wires = true;
+  DRAW_OR_SKIP(wired, s, options);
+  std::size_t darker = 0, lighter = 0, beside = 0;
+  for (int y = 100; y < 600; ++y) {
+    for (int x = 10; x < 620; ++x) {
+      const glm::vec3 before = plain.at({x, y}), now = wired.at({x, y});
+      const float change = now.r + now.g + now.b - before.r - before.g - before.b;
+      darker += change < -0.1F ? 1U : 0U;
+      lighter += change > 0.1F ? 1U : 0U;
+      beside += before == hybrid::palette::background && now != before ? 1U : 0U;
+    }
+  }
+  EXPECT_GT(darker, 1000U);
+  EXPECT_EQ(lighter, 0U);
+  EXPECT_LT(beside, 200U) << "lines at the rim may touch a pixel beside the surface";
 }
 
 TEST_F(TissueOfScan, ShowsTheGreyValuesOfTheFile) {

@@ -56,6 +56,22 @@ TEST(TickHistory, ASpikeOfTwoTicksIsInTheColumnsAtAnyFrameRate) {
   }
 }
 
+TEST(TickHistory, ThePathOfTheHandEndsWhereTheHandIs) {
+  hybrid::TickHistory history(2.0);
+  EXPECT_TRUE(history.path_m(100).empty());
+  for (int tick = 0; tick < 5000; ++tick) {
+    hybrid::TickSample now = sample(tick, 0.0F);
+    now.device_m = {1e-3 * tick, 0.0, 0.0};
+    history.add(now);
+  }
+  const std::vector<glm::dvec3> path = history.path_m(100);
+  EXPECT_LE(path.size(), 102U);
+  EXPECT_GE(path.size(), 90U);
+  EXPECT_NEAR(path.front().x, 3.0, 0.01) << "two seconds ago";
+  EXPECT_EQ(path.back().x, 1e-3 * 4999);
+  for (std::size_t n = 1; n < path.size(); ++n) EXPECT_GT(path[n].x, path[n - 1].x - 1e-12);
+}
+
 TEST(TickHistory, EveryPartHasItsSeries) {
   hybrid::TickHistory history(5.0);
   hybrid::TickSample one{.t_s = 1.0,

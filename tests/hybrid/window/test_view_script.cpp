@@ -22,6 +22,7 @@ hybrid::DrawnScene drawn() {
   scene.objects.resize(2);
   scene.objects[0].name = "bone";
   scene.objects[1].name = "left lung";
+  scene.objects[1].inside.materials = {"lobe", "large vessel"};
   scene.editable = {
       {.object = Edit::kTool,
        .quantity = EditedQuantity::coupling_stiffness,
@@ -83,12 +84,38 @@ TEST(ViewScript, RefusesWithTheLineAndWhatWouldDo) {
       {"0 look up", "tour.txt:1: 'up' is not known there; for example: look contact"},
       {"0 clip w 0.5", "tour.txt:1: 'w' is no axis"},
       {"0 key f13", "tour.txt:1: there is no key 'f13'"},
+      {"0 hide \"left lung\" fat",
+       "tour.txt:1: 'left lung' has no material 'fat'; it has lobe, large vessel"},
+      {"0 show bone marrow", "tour.txt:1: 'bone' has no material 'marrow'"},
+      {"0 opacity \"left lung\" lobe", "tour.txt:1: 'lobe' is no number"},
       {"0 step 3", "tour.txt:1: 'step' has 1 arguments"},
       {"0", "tour.txt:1: there is no command;"}};
   for (const auto& [text, words] : wrong) {
     EXPECT_EQ(refusal_of_script(text).substr(0, words.size()), words);
   }
   EXPECT_EQ(refusal_of_script(""), "");
+}
+
+TEST(ViewScript, GivesMaterialsLooksThatFollowThemIntoAChangedScene) {
+  ViewScript script(
+      "0 opacity \"left lung\" lobe 0.3\n0 hide \"left lung\" \"large vessel\"\n0 opacity \"left lung\" 0.5\n"
+      "0 wires\n1 show \"left lung\" \"large vessel\"\n1 opacity \"left lung\" lobe 1",
+      "tour.txt", drawn());
+  hybrid::ViewState state;
+  for (const auto& action : script.due(0.0)) hybrid::act(state, action);
+  EXPECT_EQ(state.view.material_look_of(1, "lobe"), (hybrid::Look{true, 0.3F}));
+  EXPECT_FALSE(state.view.material_look_of(1, "large vessel").visible);
+  EXPECT_EQ(state.view.look_of(1), (hybrid::Look{true, 0.5F}));
+  EXPECT_FALSE(state.view.separates_materials(0));
+  EXPECT_TRUE(state.view.wires);
+  hybrid::DrawnScene other = drawn();
+  std::swap(other.objects[0], other.objects[1]);
+  hybrid::go_to_scene(state, drawn(), other);
+  EXPECT_TRUE(state.view.separates_materials(0));
+  EXPECT_EQ(state.view.material_look_of(0, "lobe"), (hybrid::Look{true, 0.3F}));
+  hybrid::go_to_scene(state, other, drawn());
+  for (const auto& action : script.due(1.0)) hybrid::act(state, action);
+  EXPECT_FALSE(state.view.separates_materials(1)) << "one surface again";
 }
 
 TEST(ViewScript, MovesSlicesAndChoosesColours) {
@@ -188,19 +215,28 @@ TEST(ViewScript, ChangesOfTheSceneNameObjectsAndMaterials) {
   scene.objects[1].choices = {.tissue = true, .materials = {{.name = "lung tissue", .young_Pa = 2e3}}};
   ViewScript script(
       "0 model \"left lung\" rigid\n0 energy \"left lung\" trilinear\n0 spacing \"left lung\" 2.5\n"
-      "0 young \"lung tissue\" 3000\n0 move bone 0 -1 2\n",
+      "0 young \"lung tissue\" 3000\n0 move bone 0 -1 2\n0 poisson \"lung tissue\" 0.45\n"
+      "0 shortest \"lung tissue\" 0.5\n0 longest \"lung tissue\" 1.5\n0 shear \"lung tissue\" 0.2\n0 radius "
+      "2.5",
       "tour.txt", scene);
   hybrid::ViewState state;
   for (const auto& action : script.due(0.0)) hybrid::act(state, action);
-  ASSERT_EQ(state.changes.size(), 5U);
+  ASSERT_EQ(state.changes.size(), 10U);
+  EXPECT_EQ(state.changes[5].key, Key::poisson);
+  EXPECT_EQ(state.changes[7].name, "lung tissue");
+  EXPECT_EQ(state.changes[7].value.x, 1.5);
+  EXPECT_EQ(state.changes[9].key, Key::radius);
+  EXPECT_DOUBLE_EQ(state.changes[9].value.x, 2.5e-3);
   EXPECT_EQ(state.changes[0].key, Key::model);
   EXPECT_EQ(state.changes[0].value.x, 1.0);
   EXPECT_DOUBLE_EQ(state.changes[2].value.x, 2.5e-3);
   EXPECT_EQ(state.changes[3].name, "lung tissue");
   EXPECT_EQ(state.changes[3].value.x, 3000.0);
   EXPECT_DOUBLE_EQ(state.changes[4].value.z, 2e-3);
-  for (const std::string bad : {"0 model bone rigid", "0 model \"left lung\" jelly", "0 young iron 3",
-                                "0 spacing \"left lung\" 0", "0 move bone 1 2", "0 energy \"left lung\""}) {
+  for (const std::string bad :
+       {"0 model bone rigid", "0 model \"left lung\" jelly", "0 young iron 3", "0 spacing \"left lung\" 0",
+        "0 move bone 1 2", "0 energy \"left lung\"", "0 poisson \"lung tissue\" 0.5",
+        "0 shortest \"lung tissue\" 1.1", "0 longest \"lung tissue\" 0.9", "0 shear bone 1", "0 radius -1"}) {
     EXPECT_THROW(ViewScript(bad, "tour.txt", scene), std::runtime_error) << bad;
   }
 }

@@ -9,8 +9,8 @@
 #include <thread>
 #include <vector>
 
-#include "hybrid/program/commands.h"
-#include "hybrid/program/viewed_scene.h"
+#include "hybrid/program/view/view_command.h"
+#include "hybrid/program/view/viewed_scene.h"
 
 namespace hybrid {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/program/viewed_scene.h"
+#include "hybrid/program/view/viewed_scene.h"
 
 #include <fstream>
 #include <sstream>
@@ -18,7 +18,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{300};  // time between two looks at the scene's file
 
-std::unique_ptr<ViewedScene> load_anew(const ViewCommand& command) {
+}  // namespace
+
+std::unique_ptr<ViewedScene> load_for_window(const ViewCommand& command) {
   auto viewed = read_viewed_scene(command);
   if (viewed->scene.real_device)
     throw std::runtime_error("a scene of a real device is loaded by closing and opening the window");
@@ -26,8 +28,6 @@ std::unique_ptr<ViewedScene> load_anew(const ViewCommand& command) {
   viewed->player = std::make_unique<Player>(viewed->scene, viewed->built, viewed->drawn, nullptr);
   return viewed;
 }
-
-}  // namespace
 
 std::vector<glm::dvec3> places_along(const device::Path& path) {
   constexpr int steps = 500;
@@ -66,8 +66,9 @@ void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const P
 
 void SceneChanger::start(const ViewedScene& played) {
   built_ = asked_.size();
+  meshes_built_ = meshes_.size();
   // Makes all changes since the played scene. The text of that scene stays while the new one is built.
-  next_ = std::async(std::launch::async, [this, &played, changes = asked_] {
+  next_ = std::async(std::launch::async, [this, &played, changes = asked_, meshes = meshes_] {
     const ScopedFlushToZero flushed;  // as a replay does, so that it builds the same bits
     auto viewed = std::make_unique<ViewedScene>();
     viewed->text = changed_text(played.text, command_.scene, changes);
@@ -75,6 +76,10 @@ void SceneChanger::start(const ViewedScene& played) {
     viewed->began_with = played.began_with;
     viewed->changes = played.changes;
     for (const SceneChange& change : changes) viewed->changes.push_back(in_words(change));
+    for (const std::filesystem::path& mesh : meshes) {
+      viewed->text = text_with_mesh(viewed->text, command_.scene, mesh);
+      viewed->changes.push_back(mesh.stem().string() + ": added");
+    }
     viewed->scene = read_scene_text(viewed->text, command_.scene);
     choose_models(viewed->scene);
     if (!command_.device.empty()) use_device(viewed->scene, command_.device);
@@ -88,22 +93,24 @@ void SceneChanger::start(const ViewedScene& played) {
 
 std::unique_ptr<ViewedScene> SceneChanger::poll(const ViewedScene& played) {
   if (!next_.valid()) {
-    if (!asked_.empty()) start(played);
+    if (!asked_.empty() || !meshes_.empty()) start(played);
     return nullptr;
   }
   if (next_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return nullptr;
-  if (built_ < asked_.size()) {  // further changes were asked for meanwhile
+  if (built_ < asked_.size() || meshes_built_ < meshes_.size()) {  // more was asked for meanwhile
     start(played);
     return nullptr;
   }
   asked_.clear();
+  meshes_.clear();
   return next_.get();
 }
 
 std::unique_ptr<ViewedScene> SceneChanger::wait(const ViewedScene& played) {
-  if (asked_.empty()) return nullptr;
+  if (asked_.empty() && meshes_.empty()) return nullptr;
   start(played);
   asked_.clear();
+  meshes_.clear();
   return next_.get();
 }
 
@@ -115,6 +122,7 @@ std::string SceneChanger::building() const {
 
 void SceneChanger::cancel() {
   asked_.clear();
+  meshes_.clear();
   if (next_.valid()) next_.wait();
   next_ = {};
 }
@@ -140,7 +148,7 @@ bool SceneReload::file_changed() {
 
 void SceneReload::start() {
   asked_ = false;
-  next_ = std::async(std::launch::async, [this] { return load_anew(command_); });
+  next_ = std::async(std::launch::async, [this] { return load_for_window(command_); });
 }
 
 std::unique_ptr<ViewedScene> SceneReload::poll() {

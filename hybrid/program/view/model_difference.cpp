@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "hybrid/program/model_difference.h"
+#include "hybrid/program/view/model_difference.h"
 
 #include <fmt/format.h>
 #include <sched.h>

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "hybrid/program/commands.h"
+#include "hybrid/program/view/view_command.h"
 #include "hybrid/session/player.h"
 
 namespace hybrid {
@@ -35,6 +35,9 @@ struct ViewedScene {
 
 // Reads the file. Throws SceneError, std::runtime_error.
 [[nodiscard]] std::unique_ptr<ViewedScene> read_viewed_scene(const ViewCommand& command);
+// Reads and builds the scene, with a player on a simulated device. Throws SceneError, std::exception: also if
+// the scene has a real device.
+[[nodiscard]] std::unique_ptr<ViewedScene> load_for_window(const ViewCommand& command);
 // Builds the scene that was read. Throws SceneError.
 void build_viewed_scene(const ViewCommand& command, ViewedScene& viewed, const Progress& progress);
 
@@ -50,6 +53,8 @@ class SceneChanger {
 
   // Changes that are asked for while a scene is built are made together.
   void ask(const SceneChange& change) { asked_.push_back(change); }
+  // The same: adds a rigid object with this mesh (text_with_mesh()).
+  void add_mesh(const std::filesystem::path& mesh) { meshes_.push_back(mesh); }
   // Call once a frame. Returns the changed scene, without a player, when it is built, otherwise null. Throws
   // std::exception, once, if the scene cannot be changed that way.
   [[nodiscard]] std::unique_ptr<ViewedScene> poll(const ViewedScene& played);
@@ -65,7 +70,8 @@ class SceneChanger {
 
   const ViewCommand& command_;
   std::vector<SceneChange> asked_;
-  std::size_t built_ = 0;  // number of changes in asked_ that the scene in `next_` has
+  std::vector<std::filesystem::path> meshes_;
+  std::size_t built_ = 0, meshes_built_ = 0;  // those of asked_ and meshes_ that the scene in `next_` has
   mutable std::mutex guard_;
   std::string step_;  // of building; guard_ protects it
   std::future<std::unique_ptr<ViewedScene>> next_;
