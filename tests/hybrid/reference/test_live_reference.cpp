@@ -60,7 +60,7 @@ double percentile_90(std::vector<double> values) {
 // 0.1 JND, which no hand feels. This holds whether the reference answers often or rarely.
 TEST_F(LiveReferenceOf, TissueFindsTheErrorOfASlowRun) {
   const hybrid::Scene scene = load(kScene);
-  const std::vector<glm::dvec3> at = path(0.4);
+  const std::vector<glm::dvec3> at = path(0.6);
   tests::Touch fast(scene, at.front()), slow(scene, at.front());
   ASSERT_EQ(hybrid::why_no_live_reference(fast.world(), fast.state()), "");
   const auto copy = [&] { return hybrid::copy_state(fast.world(), fast.state()); };

@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "hybrid/build/choose_model.h"
 #include "hybrid/scene/read_scene_text.h"
 #include "hybrid/snapshot/make_drawn_scene.h"
@@ -108,15 +111,21 @@ TEST(SceneChoices, TheLimitsOfALengthAreSetOneByOne) {
 }
 
 TEST(SceneChoices, AMeshIsAddedUnderAFreeName) {
-  const std::string once = hybrid::text_with_mesh(kText, "scene.toml", "/data/a \"b\"/ball.stl");
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "a \"b\"";
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path ball = folder / "ball.stl", skull = folder / "skull.obj.gz";
+  for (const std::filesystem::path& mesh : {ball, skull})
+    std::ofstream(mesh) << "a scene's reader only looks for it";
+  const std::string once = hybrid::text_with_mesh(kText, "scene.toml", ball);
   EXPECT_NE(once.find("# of the gel"), std::string::npos);
-  const std::string twice = hybrid::text_with_mesh(once, "scene.toml", "/data/skull.obj.gz");
+  const std::string twice = hybrid::text_with_mesh(once, "scene.toml", skull);
   const hybrid::Scene scene = read(twice);
   ASSERT_EQ(scene.rigid.size(), 3U);
   EXPECT_EQ(scene.rigid[1].name, "ball 2") << "the scene has a ball";
-  EXPECT_EQ(std::get<hybrid::MeshSource>(scene.rigid[1].source).file, "/data/a \"b\"/ball.stl");
+  EXPECT_EQ(std::get<hybrid::MeshSource>(scene.rigid[1].source).file, ball);
   EXPECT_EQ(scene.rigid[2].name, "skull");
   EXPECT_THROW((void)hybrid::text_with_mesh(kText, "scene.toml", "/data/a\nb.stl"), std::runtime_error);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(SceneChoices, WhatCannotBeChangedIsSaid) {
