@@ -22,9 +22,9 @@ constexpr int kLeastMargin = 4;
 // Fraction of the force, and of the tool's motion. An axis with less of both is relaxed in every second tick.
 constexpr double kFelt = 0.3;
 // A cycle finds the places of pressed voxels along the tool from those of their neighbours before the cycle.
-// So an axis on which a cycle changes the force by more than kStillChanges (share of the force) has another one,
-// up to kCyclesInTick in a tick. A tick that moves a patch has one, because it has much work already.
-constexpr double kStillChanges = 0.01;
+// These places change the force across. So an axis other than the force's largest, on which a cycle changes
+// the force by more than kStillChanges (share of the force), has another one, up to kCyclesInTick.
+constexpr double kStillChanges = 0.002;
 constexpr int kCyclesInTick = 2;
 constexpr std::uint32_t kAllAxes = 4;  // number of ticks at the start of a contact that relax all axes
 // In spacings. A voxel no further than kPressed from the tool is pressed. Tissue on its way back is still
@@ -353,14 +353,13 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
     settle_on_grid(tool);
     return;
   }
-  const bool patch_moves = grid_->centre_on(centre_);
-  if (patch_moves) list_near_on_grid();
+  if (grid_->centre_on(centre_)) list_near_on_grid();
   const double h = lattice_->min_spacing_m();
   const glm::dvec3 way_m = tool.centre - grid_tool_m_;
   if (nearest_m_ <= kPressed * h) go_along(*grid_, dent_m_, grid_force_N_, way_m, h);
   std::array<bool, 3> axes = axes_due(way_m);
   constexpr std::array<bool, 3> kNone{};
-  const int most = patch_moves || work_share_ < 1.0 ? 1 : kCyclesInTick;
+  const int most = work_share_ < 1.0 ? 1 : kCyclesInTick;
   for (int n = 0; n < most && axes != kNone; ++n) {
     press_on_grid(tool);
     grid_->cycle(axes);
@@ -371,7 +370,8 @@ void SoftObject::relax_on_grid(const ToolInBody& tool) noexcept {
     const double changes_N = kStillChanges * glm::length(grid_force_N_);
     for (int d = 0; d < 3; ++d) {
       bool& due = axes[static_cast<std::size_t>(d)];
-      due = due && std::abs(grid_force_N_[d] - before_N[d]) > changes_N;
+      due = due && d != CompositeGrid::largest_axis(grid_force_N_) &&
+            std::abs(grid_force_N_[d] - before_N[d]) > changes_N;
     }
   }
   contact_energy_.account(way_m, grid_force_N_, depth_of(dent_m_, grid_force_N_));
