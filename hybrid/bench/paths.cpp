@@ -200,7 +200,7 @@ GoalPath corner_path(double tool_radius_m, bool symmetric, int laps) {
   // corners (m)
   static constexpr std::array<glm::dvec3, 4> kPlain{
       {{0.04, 0.0512, 0.02}, {0.04, 0.0512, -0.0053}, {-0.005, 0.0512, -0.0053}, {-0.005, -0.0047, -0.0053}}};
-  // corners (m); the way meets the three planes at the same time
+  // corners (m); the way lies in planes of mesh edges, so rays from the goal to the proxy meet edges exactly
   static constexpr std::array<glm::dvec3, 4> kSymmetric{
       {{0.04, 0.05, 0.02}, {0.04, 0.05, -0.005}, {-0.005, 0.05, -0.005}, {-0.005, -0.005, -0.005}}};
   const auto& c = symmetric ? kSymmetric : kPlain;

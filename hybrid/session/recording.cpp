@@ -76,7 +76,8 @@ std::uint64_t before_changes(const Header& header) {
   throw std::runtime_error(fmt::format("{}: {}; copy it again", file.string(), why));
 }
 
-// Reads the changes of the scene. `left`: bytes of the file from here on; afterwards those of the edits.
+// Reads the changes of the scene. `left`: bytes left in the file. On return only the
+// edits are left, so it is their size.
 std::vector<RecordedChange> read_changes(std::istream& in, const std::filesystem::path& file,
                                          std::uint64_t ticks, std::uint64_t& left) {
   std::vector<RecordedChange> changes;

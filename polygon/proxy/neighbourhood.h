@@ -76,8 +76,8 @@ class Neighbourhood {
   }
   void set_plane(std::uint32_t i, const SeparatingPlane& plane) noexcept;
 
-  // Makes all planes anew that `view` violates, although `view` touches nothing. Needed if the proxy reached
-  // `view` by another way than a step that the planes allowed.
+  // Remakes every plane that `view` violates. Call it if the proxy reached `view`, where it touches nothing,
+  // other than by a step within the planes.
   void refresh_planes(const RigidSurface& surface, const glm::dvec3& view, double radius,
                       double rounding) noexcept;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Numbered checks of a mesh, and the repair of a mesh. README.md lists the findings, and the defects that a
-// person has to mend. All steps beyond counting use CGAL: its exact predicates (self_intersections.cpp) and
-// its polygon mesh processing (repair.cpp).
+// person has to mend. Self-intersections are found with CGAL's exact predicates (self_intersections.cpp).
+// Merging, closing cracks and filling holes are own code; CGAL orients and stitches (repair.cpp).
 #pragma once
 
 #include <cstddef>

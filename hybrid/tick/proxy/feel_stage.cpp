@@ -160,7 +160,8 @@ Sweep shade(const World& world, WorldState& state, const Goal& goal, Sweep sweep
   return sweep;
 }
 
-// Splits the whole force of the surfaces into the sweep's part and that of friction and shading.
+// Stores the part of the surfaces' force that friction and shading add to the sweep's part. Returns the sweep
+// with the whole force.
 Sweep split_force(WorldState& state, const Goal& goal, std::uint32_t from_object, Sweep sweep) noexcept {
   const glm::dvec3 force = goal.metric * (sweep.point - goal.target);
   state.friction_N = force - sweep.force_N;
